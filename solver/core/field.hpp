@@ -1,0 +1,59 @@
+#pragma once
+// Every quantity a soil particle can carry, declared once: name, unit, shape, number type. The store allocates it,
+// migration sends it, HDF5 writes it and the memory estimate counts it from this one line.
+#include <algorithm>
+#include <cstdint>
+#include <string_view>
+#include <tuple>
+
+namespace kuzure {
+
+template <std::size_t N> struct Text {
+    char chars[N]{};
+    consteval Text(const char (&s)[N]) { std::copy_n(s, N, chars); }
+};
+enum class Shape { Scalar = 1, Vector = 3, Symmetric = 6, Matrix = 9 };
+
+template <Text Name, Text Unit, Shape S, class T = double> struct Field {
+    static constexpr std::string_view name = Name.chars;
+    static constexpr std::string_view unit = Unit.chars;
+    static constexpr Shape shape = S;
+    static constexpr int components = int(S);
+    using Number = T;
+};
+
+namespace field {
+// State at the step's time t: what snapshots show.
+inline constexpr struct Position : Field<"position", "m", Shape::Vector> {
+} position;
+inline constexpr struct Velocity : Field<"velocity", "m/s", Shape::Vector> {
+} velocity;
+inline constexpr struct Density : Field<"density", "kg/m^3", Shape::Scalar> {
+} density;
+inline constexpr struct Stress : Field<"stress", "Pa", Shape::Symmetric> {
+} stress;
+inline constexpr struct PlasticStrain : Field<"plastic_strain", "1", Shape::Scalar> {
+} plastic_strain;
+// State half a step earlier: what the leap-frog advances.
+inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
+} half_velocity;
+inline constexpr struct HalfDensity : Field<"half_step_density", "kg/m^3", Shape::Scalar> {
+} half_density;
+inline constexpr struct HalfStress : Field<"half_step_stress", "Pa", Shape::Symmetric> {
+} half_stress;
+// Where the particle was at the last sort (its place in the global order) and at t = 0 (its displacement).
+inline constexpr struct SortedPosition : Field<"sorted_position", "m", Shape::Vector> {
+} sorted_position;
+inline constexpr struct Origin : Field<"origin", "m", Shape::Vector> {
+} origin;
+inline constexpr struct Id : Field<"id", "1", Shape::Scalar, std::int64_t> {
+} id;
+inline constexpr struct Soil : Field<"soil", "1", Shape::Scalar, std::int32_t> {
+} soil;
+} // namespace field
+
+using AllFields =
+    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
+               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil>;
+
+} // namespace kuzure

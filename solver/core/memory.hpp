@@ -1,0 +1,42 @@
+#pragma once
+// Arrays for hot loops: aligned to a cache line, on huge pages where they are large, and not touched when they are
+// made, so that the thread that first writes a page owns it.
+#include <cstdlib>
+#include <new>
+#include <type_traits>
+#include <utility>
+#include <vector>
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
+namespace kuzure {
+
+template <class T> struct HugePages {
+    using value_type = T;
+    HugePages() = default;
+    template <class U> HugePages(const HugePages<U>&) {}
+    T* allocate(std::size_t n)
+    {
+        const std::size_t page = std::size_t(1) << 21, small = 64;
+        std::size_t bytes = n * sizeof(T);
+        const std::size_t align = bytes >= page ? page : small;
+        bytes = (bytes + align - 1) / align * align;
+        void* p = std::aligned_alloc(align, bytes ? bytes : align);
+        if (!p) throw std::bad_alloc();
+#if defined(__linux__)
+        if (align == page) madvise(p, bytes, MADV_HUGEPAGE);
+#endif
+        return static_cast<T*>(p);
+    }
+    void deallocate(T* p, std::size_t) { std::free(p); }
+    /// Leaves new elements as the memory comes: first touch belongs to the thread that writes.
+    template <class U> void construct(U* p) noexcept { ::new (static_cast<void*>(p)) U; }
+    template <class U, class... A> void construct(U* p, A&&... a) { ::new (static_cast<void*>(p)) U(std::forward<A>(a)...); }
+    template <class U> bool operator==(const HugePages<U>&) const { return true; }
+};
+
+/// Uninitialised when resized.
+template <class T> using Array = std::vector<T, HugePages<T>>;
+
+} // namespace kuzure

@@ -1,0 +1,296 @@
+#pragma once
+// The only file that knows a SIMD type or an intrinsic. Everything else is written once for a number type V that is
+// `double` (or `float`): one particle, the plain reference; or `Simd<T, W>`: W particles in one register. A width that
+// the machine has no register for still works (the compiler splits it), so eight lanes can be tested on AVX2.
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace kuzure {
+
+using Index = std::int32_t;
+
+#define KUZURE_INLINE inline __attribute__((always_inline))
+
+namespace detail {
+template <class T, int W> struct VectorOf {
+    typedef T type __attribute__((vector_size(W * sizeof(T))));
+};
+} // namespace detail
+
+/// W numbers of type T in one register (or several, where the machine's are shorter).
+template <class T, int W> struct Simd {
+    using Vec = typename detail::VectorOf<T, W>::type;
+    using Number = T;
+    static constexpr int lanes = W;
+    Vec v;
+    KUZURE_INLINE Simd() = default;
+    KUZURE_INLINE Simd(Vec a) : v(a) {}
+    KUZURE_INLINE Simd(T a) : v(a - Vec{}) {}
+    KUZURE_INLINE T operator[](int lane) const { return v[lane]; }
+};
+
+namespace detail {
+template <class V> struct NumberOf { using type = typename V::Number; static constexpr int lanes = V::lanes; };
+template <> struct NumberOf<double> { using type = double; static constexpr int lanes = 1; };
+template <> struct NumberOf<float> { using type = float; static constexpr int lanes = 1; };
+} // namespace detail
+
+template <class V> using number = typename detail::NumberOf<V>::type;
+template <class V> inline constexpr int width = detail::NumberOf<V>::lanes;
+
+#if defined(__AVX512F__)
+inline constexpr int register_bytes = 64;
+#elif defined(__AVX2__)
+inline constexpr int register_bytes = 32;
+#else
+inline constexpr int register_bytes = 16;
+#endif
+/// The register of this instruction set.
+template <class T> using Native = Simd<T, register_bytes / int(sizeof(T))>;
+
+/// Name of the instruction set the lanes were compiled for.
+inline const char* instruction_set()
+{
+#if defined(__AVX512ER__) || (defined(__AVX512F__) && !defined(__AVX512VL__))
+    return "avx512-knl";
+#elif defined(__AVX512F__)
+    return "avx512";
+#elif defined(__AVX2__)
+    return "avx2";
+#else
+    return "x86-64";
+#endif
+}
+
+// ---- arithmetic --------------------------------------------------------------------------------------------------
+#define KUZURE_T template <class T, int W> KUZURE_INLINE
+KUZURE_T Simd<T, W> operator+(Simd<T, W> a, Simd<T, W> b) { return a.v + b.v; }
+KUZURE_T Simd<T, W> operator-(Simd<T, W> a, Simd<T, W> b) { return a.v - b.v; }
+KUZURE_T Simd<T, W> operator*(Simd<T, W> a, Simd<T, W> b) { return a.v * b.v; }
+KUZURE_T Simd<T, W> operator/(Simd<T, W> a, Simd<T, W> b) { return a.v / b.v; }
+KUZURE_T Simd<T, W> operator-(Simd<T, W> a) { return -a.v; }
+KUZURE_T Simd<T, W> operator+(Simd<T, W> a, T b) { return a + Simd<T, W>(b); }
+KUZURE_T Simd<T, W> operator+(T a, Simd<T, W> b) { return Simd<T, W>(a) + b; }
+KUZURE_T Simd<T, W> operator-(Simd<T, W> a, T b) { return a - Simd<T, W>(b); }
+KUZURE_T Simd<T, W> operator-(T a, Simd<T, W> b) { return Simd<T, W>(a) - b; }
+KUZURE_T Simd<T, W> operator*(Simd<T, W> a, T b) { return a * Simd<T, W>(b); }
+KUZURE_T Simd<T, W> operator*(T a, Simd<T, W> b) { return Simd<T, W>(a) * b; }
+KUZURE_T Simd<T, W> operator/(Simd<T, W> a, T b) { return a / Simd<T, W>(b); }
+KUZURE_T Simd<T, W> operator/(T a, Simd<T, W> b) { return Simd<T, W>(a) / b; }
+KUZURE_T Simd<T, W>& operator+=(Simd<T, W>& a, Simd<T, W> b) { return a = a + b; }
+KUZURE_T Simd<T, W>& operator-=(Simd<T, W>& a, Simd<T, W> b) { return a = a - b; }
+KUZURE_T Simd<T, W>& operator*=(Simd<T, W>& a, Simd<T, W> b) { return a = a * b; }
+
+/// a * b + c with one rounding, on every instruction set: the bits do not depend on what the compiler would contract.
+KUZURE_INLINE double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
+KUZURE_INLINE float fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+KUZURE_T Simd<T, W> fma(Simd<T, W> a, Simd<T, W> b, Simd<T, W> c)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_fmadd_pd(a.v, b.v, c.v)};
+    if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_fmadd_ps(a.v, b.v, c.v)};
+#endif
+#if defined(__FMA__)
+    if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_fmadd_pd(a.v, b.v, c.v)};
+    if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+#endif
+    Simd<T, W> r;
+    for (int k = 0; k < W; ++k) r.v[k] = fma(T(a.v[k]), T(b.v[k]), T(c.v[k]));
+    return r;
+}
+/// c - a * b with one rounding.
+template <class V> KUZURE_INLINE V fnma(V a, V b, V c) { return fma(-a, b, c); }
+
+KUZURE_INLINE double min(double a, double b) { return a < b ? a : b; }
+KUZURE_INLINE double max(double a, double b) { return a > b ? a : b; }
+KUZURE_INLINE float min(float a, float b) { return a < b ? a : b; }
+KUZURE_INLINE float max(float a, float b) { return a > b ? a : b; }
+/// The smaller of two; the second where either is not a number, as the machine instruction does.
+KUZURE_T Simd<T, W> min(Simd<T, W> a, Simd<T, W> b)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_min_pd(a.v, b.v)};
+    if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_min_ps(a.v, b.v)};
+#endif
+#if defined(__AVX2__)
+    if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_min_pd(a.v, b.v)};
+    if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_min_ps(a.v, b.v)};
+#endif
+    return {a.v < b.v ? a.v : b.v};
+}
+/// The larger of two; the second where either is not a number.
+KUZURE_T Simd<T, W> max(Simd<T, W> a, Simd<T, W> b)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_max_pd(a.v, b.v)};
+    if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_max_ps(a.v, b.v)};
+#endif
+#if defined(__AVX2__)
+    if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_max_pd(a.v, b.v)};
+    if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_max_ps(a.v, b.v)};
+#endif
+    return {a.v > b.v ? a.v : b.v};
+}
+KUZURE_INLINE double sqrt(double a) { return __builtin_sqrt(a); }
+KUZURE_INLINE float sqrt(float a) { return __builtin_sqrtf(a); }
+KUZURE_T Simd<T, W> sqrt(Simd<T, W> a)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_sqrt_pd(a.v)};
+    if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_sqrt_ps(a.v)};
+#endif
+#if defined(__AVX2__)
+    if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_sqrt_pd(a.v)};
+    if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_sqrt_ps(a.v)};
+#endif
+    Simd<T, W> r;
+    for (int k = 0; k < W; ++k) r.v[k] = sqrt(T(a.v[k]));
+    return r;
+}
+KUZURE_INLINE double abs(double a) { return __builtin_fabs(a); }
+KUZURE_T Simd<T, W> abs(Simd<T, W> a) { return max(a, -a); }
+
+// ---- comparison: a Mask has one bit of truth a lane ---------------------------------------------------------------
+template <class T, int W> struct Mask {
+#if defined(__AVX512F__)
+    static constexpr bool in_mask_register = W * sizeof(T) == 64;
+#else
+    static constexpr bool in_mask_register = false;
+#endif
+    using Int = std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>;
+    using Vec = typename detail::VectorOf<Int, W>::type;
+    std::conditional_t<in_mask_register, std::uint32_t, Vec> m;
+};
+
+/// True in the lanes where a < b.
+KUZURE_INLINE bool less(double a, double b) { return a < b; }
+KUZURE_INLINE bool less(float a, float b) { return a < b; }
+KUZURE_T Mask<T, W> less(Simd<T, W> a, Simd<T, W> b)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_cmp_pd_mask(a.v, b.v, _CMP_LT_OQ)};
+    else if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)};
+    else
+#endif
+        return {a.v < b.v};
+}
+/// One bit a lane, lane 0 lowest.
+KUZURE_INLINE unsigned bits(bool m) { return m; }
+KUZURE_T unsigned bits(Mask<T, W> m)
+{
+    if constexpr (Mask<T, W>::in_mask_register) return m.m;
+    else {
+#if defined(__AVX2__)
+        if constexpr (sizeof(T) == 8 && W == 4) return unsigned(_mm256_movemask_pd((__m256d)m.m));
+        if constexpr (sizeof(T) == 4 && W == 8) return unsigned(_mm256_movemask_ps((__m256)m.m));
+#endif
+        unsigned r = 0;
+        for (int k = 0; k < W; ++k) r |= unsigned(m.m[k] != 0) << k;
+        return r;
+    }
+}
+/// yes where the mask is set, no elsewhere.
+KUZURE_INLINE double select(bool m, double yes, double no) { return m ? yes : no; }
+KUZURE_INLINE float select(bool m, float yes, float no) { return m ? yes : no; }
+KUZURE_T Simd<T, W> select(Mask<T, W> m, Simd<T, W> yes, Simd<T, W> no)
+{
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && W == 8) return {_mm512_mask_blend_pd(__mmask8(m.m), no.v, yes.v)};
+    else if constexpr (sizeof(T) == 4 && W == 16) return {_mm512_mask_blend_ps(__mmask16(m.m), no.v, yes.v)};
+    else
+#endif
+        return {m.m ? yes.v : no.v};
+}
+
+// ---- memory ------------------------------------------------------------------------------------------------------
+/// W consecutive numbers, at any address.
+template <class V> KUZURE_INLINE V load(const number<V>* p)
+{
+    if constexpr (width<V> == 1) return *p;
+    else {
+        V r;
+        std::memcpy(&r.v, p, sizeof r.v);
+        return r;
+    }
+}
+template <class V> KUZURE_INLINE void store(number<V>* p, V a)
+{
+    if constexpr (width<V> == 1) *p = a;
+    else std::memcpy(p, &a.v, sizeof a.v);
+}
+/// The first n lanes only; nothing beyond is touched.
+template <class V> KUZURE_INLINE void store_first(number<V>* p, V a, int n)
+{
+    if (n >= width<V>) return store(p, a);
+    if constexpr (width<V> > 1)
+        for (int k = 0; k < n; ++k) p[k] = a.v[k];
+}
+/// table[index[lane]] in each lane.
+template <class V> KUZURE_INLINE V gather(const number<V>* table, const std::int32_t* index)
+{
+    if constexpr (width<V> == 1) return table[*index];
+    else {
+        V r;
+        for (int k = 0; k < width<V>; ++k) r.v[k] = table[index[k]];
+        return r;
+    }
+}
+KUZURE_INLINE double lane(double a, int) { return a; }
+KUZURE_INLINE float lane(float a, int) { return a; }
+KUZURE_T T lane(Simd<T, W> a, int k) { return a.v[k]; }
+
+KUZURE_INLINE double sum(double a) { return a; }
+/// Sum over the lanes, lane 0 first. Only for sums that are exact in any order, or for tests.
+KUZURE_T T sum(Simd<T, W> a)
+{
+    T s = a.v[0];
+    for (int k = 1; k < W; ++k) s += a.v[k];
+    return s;
+}
+KUZURE_INLINE double largest(double a) { return a; }
+KUZURE_T T largest(Simd<T, W> a)
+{
+    T s = a.v[0];
+    for (int k = 1; k < W; ++k) s = s > a.v[k] ? s : T(a.v[k]);
+    return s;
+}
+
+// ---- reciprocals ---------------------------------------------------------------------------------------------------
+/// {1/sqrt(a), 1/b}. Where the machine divides slowly (AVX-512): 14-bit estimates and one third-order Newton step each,
+/// below 1e-12; elsewhere one IEEE square root and one division serve both.
+template <class V> struct Reciprocals { V inverse_sqrt, inverse; };
+template <class V> KUZURE_INLINE Reciprocals<V> reciprocals(V a, V b)
+{
+    using T = number<V>;
+#if defined(__AVX512F__)
+    if constexpr (sizeof(T) == 8 && width<V> == 8) {
+        const V y = V(_mm512_rsqrt14_pd(a.v)), e = fnma(a * y, y, V(T(1)));
+        const V z = V(_mm512_rcp14_pd(b.v)), f = fnma(b, z, V(T(1)));
+        return {fma(y * e, fma(e, V(T(0.375)), V(T(0.5))), y), fma(z, fma(f, f, f), z)};
+    }
+    if constexpr (sizeof(T) == 4 && width<V> == 16) {
+        const V y = V(_mm512_rsqrt14_ps(a.v)), e = fnma(a * y, y, V(T(1)));
+        const V z = V(_mm512_rcp14_ps(b.v)), f = fnma(b, z, V(T(1)));
+        return {fma(y * e, V(T(0.5)), y), fma(z, f, z)};
+    }
+#endif
+    const V s = sqrt(a), r = V(T(1)) / (s * b);
+    return {r * b, r * s};
+}
+
+/// Tell the processor of this thread to take denormal numbers as zero: they cost 60 to 70 times a normal operation.
+inline void flush_denormals()
+{
+#if defined(__x86_64__)
+    _mm_setcsr(_mm_getcsr() | 0x8040);
+#endif
+}
+inline void prefetch(const void* p) { __builtin_prefetch(p); }
+
+#undef KUZURE_T
+} // namespace kuzure

@@ -1,0 +1,157 @@
+#pragma once
+// A scene as plain structs, in SI units and radians. An effect is on exactly when its optional has a value, after
+// resolve() has decided what the file left to "auto".
+#include "solver/core/tensor.hpp"
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace kuzure::scene {
+
+// ---- shapes (solver/scene/shape.hpp knows their geometry) ----------------------------------------------------------
+struct Box {
+    Vector low, high; // m
+};
+/// Axis along z.
+struct Cylinder {
+    Vector base; // m
+    double radius, height;
+};
+struct Sphere {
+    Vector center; // m
+    double radius;
+};
+/// Closed polygon in x-z, drawn out along y from y[0] to y[1] (ignored in 2-D).
+struct Polygon {
+    std::vector<std::array<double, 2>> points; // x, z in m
+    std::array<double, 2> y;
+};
+using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
+
+// ---- matter --------------------------------------------------------------------------------------------------------
+enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation };
+
+struct Soil {
+    std::string name;
+    double density;            // kg/m^3
+    double young;              // Pa
+    double poisson;            // 1
+    double cohesion = 0;       // Pa
+    double friction_angle = 0; // rad
+    double dilation_angle = 0; // rad
+    Cone cone = Cone::Compression;
+    std::optional<double> tension_cutoff; // Pa, largest mean tension; at most the apex c cot(phi)
+};
+
+enum class InitialStress { None, AtRest };
+struct Body {
+    int soil; // index into Scene::soils
+    Shape shape;
+    Vector velocity{}; // m/s
+    InitialStress stress = InitialStress::None;
+};
+
+enum class Surface { Rough, Smooth, Coulomb };
+struct Wall {
+    Shape shape;
+    Surface surface = Surface::Rough;
+    double friction_angle = 0; // rad, for Coulomb
+};
+
+// ---- effects -------------------------------------------------------------------------------------------------------
+struct Viscosity {
+    double alpha, beta;
+};
+struct ArtificialStress {
+    double epsilon = 0.5, exponent = 2.55;
+};
+struct StressDiffusion {
+    double zeta;
+};
+struct Damping {
+    double ratio; // of critical, 1
+    double until; // s
+};
+struct Effects {
+    std::optional<Vector> gravity; // m/s^2
+    std::optional<Viscosity> viscosity;
+    std::optional<ArtificialStress> artificial_stress;
+    std::optional<StressDiffusion> stress_diffusion;
+    std::optional<Damping> damping;
+};
+/// One line of the effects list: what is on or off, and why.
+struct EffectNote {
+    std::string name, why;
+    bool on;
+};
+
+// ---- accuracy, output ----------------------------------------------------------------------------------------------
+enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
+enum class Precision { Double, Mixed };
+enum class Correction { None, Gradient };
+
+struct Accuracy {
+    Kernel kernel = Kernel::CubicSpline;
+    double cfl = 0.2;
+    Precision precision = Precision::Double;
+    Correction correction = Correction::None;
+    double skin = 0.1; // list skin in support radii (2 h): cost only, no effect on the result but its last bits
+};
+
+enum class View { Oblique, Side, Top };
+enum class Color { Displacement, Speed, PlasticStrain, Pressure };
+struct Picture {
+    View view = View::Oblique;
+    Color color = Color::Displacement;
+};
+struct Output {
+    std::string directory;                // empty: results/<scene file's name>
+    std::optional<double> every;          // s between snapshots
+    std::vector<std::string> fields;      // empty: all
+    std::optional<double> history;        // s between rows of history.csv
+    std::optional<double> grain;          // m, column height at which a front counts; absent: one spacing
+    double checkpoint_minutes = 30;
+    std::optional<Picture> picture;
+};
+
+struct Space {
+    double spacing;    // m
+    double h = 1.3;    // smoothing length in spacings
+    std::optional<Vector> low, high; // m, box that particles may not leave
+    std::array<bool, 3> periodic{};
+};
+struct Time {
+    double end;                 // s
+    std::optional<double> step; // s, fixed step
+};
+
+} // namespace kuzure::scene
+
+namespace kuzure {
+
+struct Scene {
+    std::string title;
+    int dimensions = 3;
+    scene::Space space;
+    scene::Time time;
+    std::vector<scene::Soil> soils;
+    std::vector<scene::Body> bodies;
+    std::vector<scene::Wall> walls;
+    scene::Effects effects;
+    scene::Accuracy accuracy;
+    scene::Output output;
+    std::vector<scene::EffectNote> notes; // made by resolve()
+
+    double smoothing_length() const { return space.h * space.spacing; }  // m
+    double support() const { return 2 * smoothing_length(); }            // m
+    /// Volume (3-D, m^3) or area (2-D, m^2 per metre of thickness) of one particle.
+    double particle_volume() const
+    {
+        return dimensions == 3 ? space.spacing * space.spacing * space.spacing : space.spacing * space.spacing;
+    }
+};
+
+} // namespace kuzure
