@@ -67,6 +67,26 @@ inline const char* instruction_set()
 #endif
 }
 
+namespace detail {
+/// The lanes of a register one by one. Through memory for Knights Landing: GCC 12 takes a lane of a 512-bit register by
+/// vextractf64x2, which that machine does not have.
+template <class T, int W> struct Lanes {
+#if defined(__AVX512F__) && !defined(__AVX512DQ__)
+    T at[W];
+    KUZURE_INLINE explicit Lanes(Simd<T, W> a)
+    {
+        std::memcpy(at, &a.v, sizeof at);
+        asm("" : "+m"(at));
+    }
+    KUZURE_INLINE T operator[](int k) const { return at[k]; }
+#else
+    typename Simd<T, W>::Vec v;
+    KUZURE_INLINE explicit Lanes(Simd<T, W> a) : v(a.v) {}
+    KUZURE_INLINE T operator[](int k) const { return v[k]; }
+#endif
+};
+} // namespace detail
+
 // ---- arithmetic --------------------------------------------------------------------------------------------------
 #define KUZURE_T template <class T, int W> KUZURE_INLINE
 KUZURE_T Simd<T, W> operator+(Simd<T, W> a, Simd<T, W> b) { return a.v + b.v; }
@@ -228,7 +248,10 @@ template <class V> KUZURE_INLINE void store_first(number<V>* p, V a, int n)
 {
     if (n >= width<V>) return store(p, a);
     if constexpr (width<V> > 1)
-        for (int k = 0; k < n; ++k) p[k] = a.v[k];
+    {
+        const detail::Lanes lanes(a);
+        for (int k = 0; k < n; ++k) p[k] = lanes[k];
+    }
 }
 /// table[index[lane]] in each lane.
 template <class V> KUZURE_INLINE V gather(const number<V>* table, const std::int32_t* index)
@@ -242,21 +265,23 @@ template <class V> KUZURE_INLINE V gather(const number<V>* table, const std::int
 }
 KUZURE_INLINE double lane(double a, int) { return a; }
 KUZURE_INLINE float lane(float a, int) { return a; }
-KUZURE_T T lane(Simd<T, W> a, int k) { return a.v[k]; }
+KUZURE_T T lane(Simd<T, W> a, int k) { return detail::Lanes<T, W>(a)[k]; }
 
 KUZURE_INLINE double sum(double a) { return a; }
 /// Sum over the lanes, lane 0 first. Only for sums that are exact in any order, or for tests.
 KUZURE_T T sum(Simd<T, W> a)
 {
-    T s = a.v[0];
-    for (int k = 1; k < W; ++k) s += a.v[k];
+    const detail::Lanes lanes(a);
+    T s = lanes[0];
+    for (int k = 1; k < W; ++k) s += lanes[k];
     return s;
 }
 KUZURE_INLINE double largest(double a) { return a; }
 KUZURE_T T largest(Simd<T, W> a)
 {
-    T s = a.v[0];
-    for (int k = 1; k < W; ++k) s = s > a.v[k] ? s : T(a.v[k]);
+    const detail::Lanes lanes(a);
+    T s = lanes[0];
+    for (int k = 1; k < W; ++k) s = s > lanes[k] ? s : lanes[k];
     return s;
 }
 

@@ -1,37 +1,41 @@
 #pragma once
-// A scene as plain structs, in SI units and radians. An effect is on exactly when its optional has a value, after
-// resolve() has decided what the file left to "auto".
+// A scene as plain structs, in SI units and radians. An effect is on exactly when its optional has a value,
+// after resolve() has decided what the file left to "auto".
 #include "solver/core/tensor.hpp"
 #include <array>
-#include <map>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-namespace kuzure::scene {
+namespace kuzure::scene
+{
 
-// ---- shapes (solver/scene/shape.hpp knows their geometry) ----------------------------------------------------------
+// ---- shapes (solver/scene/shape.hpp knows their geometry) ----
 struct Box {
     Vector low, high; // m
+    bool operator==(const Box&) const = default;
 };
 /// Axis along z.
 struct Cylinder {
     Vector base; // m
     double radius, height;
+    bool operator==(const Cylinder&) const = default;
 };
 struct Sphere {
     Vector center; // m
     double radius;
+    bool operator==(const Sphere&) const = default;
 };
 /// Closed polygon in x-z, drawn out along y from y[0] to y[1] (ignored in 2-D).
 struct Polygon {
     std::vector<std::array<double, 2>> points; // x, z in m
-    std::array<double, 2> y;
+    std::array<double, 2> y{};                 // m
+    bool operator==(const Polygon&) const = default;
 };
 using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
 
-// ---- matter --------------------------------------------------------------------------------------------------------
+// ---- matter ----
 enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation };
 
 struct Soil {
@@ -44,6 +48,7 @@ struct Soil {
     double dilation_angle = 0; // rad
     Cone cone = Cone::Compression;
     std::optional<double> tension_cutoff; // Pa, largest mean tension; at most the apex c cot(phi)
+    bool operator==(const Soil&) const = default;
 };
 
 enum class InitialStress { None, AtRest };
@@ -52,6 +57,7 @@ struct Body {
     Shape shape;
     Vector velocity{}; // m/s
     InitialStress stress = InitialStress::None;
+    bool operator==(const Body&) const = default;
 };
 
 enum class Surface { Rough, Smooth, Coulomb };
@@ -59,46 +65,52 @@ struct Wall {
     Shape shape;
     Surface surface = Surface::Rough;
     double friction_angle = 0; // rad, for Coulomb
+    bool operator==(const Wall&) const = default;
 };
 
-// ---- effects -------------------------------------------------------------------------------------------------------
+// ---- effects ----
 struct Viscosity {
     double alpha, beta;
+    bool operator==(const Viscosity&) const = default;
 };
 struct ArtificialStress {
     double epsilon = 0.5, exponent = 2.55;
-};
-struct StressDiffusion {
-    double zeta;
+    bool operator==(const ArtificialStress&) const = default;
 };
 struct Damping {
     double ratio; // of critical, 1
     double until; // s
+    bool operator==(const Damping&) const = default;
 };
+/// Who decides whether an effect is on: the file, or resolve() from the rest of the scene.
+enum class Decision { AsWritten, Auto };
 struct Effects {
     std::optional<Vector> gravity; // m/s^2
     std::optional<Viscosity> viscosity;
     std::optional<ArtificialStress> artificial_stress;
-    std::optional<StressDiffusion> stress_diffusion;
+    Decision artificial_stress_decision = Decision::AsWritten;
     std::optional<Damping> damping;
+    bool operator==(const Effects&) const = default;
 };
-/// One line of the effects list: what is on or off, and why.
+/// One line of the effects list: what is on or off, and why. The name is the scene's key where there is one.
 struct EffectNote {
     std::string name, why;
     bool on;
+    bool operator==(const EffectNote&) const = default;
 };
 
-// ---- accuracy, output ----------------------------------------------------------------------------------------------
+// ---- accuracy, output ----
 enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
 enum class Precision { Double, Mixed };
-enum class Correction { None, Gradient };
+enum class Correction { None };
 
 struct Accuracy {
     Kernel kernel = Kernel::CubicSpline;
     double cfl = 0.2;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;
-    double skin = 0.1; // list skin in support radii (2 h): cost only, no effect on the result but its last bits
+    double skin = 0.1; // list skin in support radii (2 h): cost only, results change in their last bits
+    bool operator==(const Accuracy&) const = default;
 };
 
 enum class View { Oblique, Side, Top };
@@ -106,31 +118,36 @@ enum class Color { Displacement, Speed, PlasticStrain, Pressure };
 struct Picture {
     View view = View::Oblique;
     Color color = Color::Displacement;
+    bool operator==(const Picture&) const = default;
 };
 struct Output {
-    std::string directory;                // empty: results/<scene file's name>
-    std::optional<double> every;          // s between snapshots
-    std::vector<std::string> fields;      // empty: all
-    std::optional<double> history;        // s between rows of history.csv
-    std::optional<double> grain;          // m, column height at which a front counts; absent: one spacing
+    std::string directory;       // empty: results/<scene file's name>
+    std::optional<double> every; // s between snapshots
+    std::vector<std::string> fields{"velocity", "stress", "density", "plastic_strain", "displacement"};
+    std::optional<double> history; // s between rows of history.csv
+    std::optional<double> grain;   // m, column height at which a front counts; absent: one spacing
     double checkpoint_minutes = 30;
     std::optional<Picture> picture;
+    bool operator==(const Output&) const = default;
 };
 
 struct Space {
-    double spacing;    // m
-    double h = 1.3;    // smoothing length in spacings
+    double spacing;                  // m
+    double h = 1.3;                  // smoothing length in spacings
     std::optional<Vector> low, high; // m, box that particles may not leave
     std::array<bool, 3> periodic{};
+    bool operator==(const Space&) const = default;
 };
 struct Time {
     double end;                 // s
     std::optional<double> step; // s, fixed step
+    bool operator==(const Time&) const = default;
 };
 
 } // namespace kuzure::scene
 
-namespace kuzure {
+namespace kuzure
+{
 
 struct Scene {
     std::string title;
@@ -145,13 +162,15 @@ struct Scene {
     scene::Output output;
     std::vector<scene::EffectNote> notes; // made by resolve()
 
-    double smoothing_length() const { return space.h * space.spacing; }  // m
-    double support() const { return 2 * smoothing_length(); }            // m
+    double smoothing_length() const { return space.h * space.spacing; } // m
+    double support() const { return 2 * smoothing_length(); }           // m
     /// Volume (3-D, m^3) or area (2-D, m^2 per metre of thickness) of one particle.
     double particle_volume() const
     {
-        return dimensions == 3 ? space.spacing * space.spacing * space.spacing : space.spacing * space.spacing;
+        return dimensions == 3 ? space.spacing * space.spacing * space.spacing
+                               : space.spacing * space.spacing;
     }
+    bool operator==(const Scene&) const = default;
 };
 
 } // namespace kuzure

@@ -1,0 +1,266 @@
+#include "decomposition/comm.hpp"
+#include "decomposition/mpi.hpp"
+#include <algorithm>
+#include <climits>
+#include <cstdio>
+
+namespace kuzure
+{
+
+using mpi::check;
+
+struct Comm::Handle {
+    MPI_Comm comm = MPI_COMM_NULL;
+};
+
+namespace
+{
+
+std::unique_ptr<Comm>& the_world()
+{
+    static std::unique_ptr<Comm> world;
+    return world;
+}
+
+/// `bytes` bytes as one item, however many.
+mpi::Type long_item(std::size_t bytes, std::size_t piece)
+{
+    const std::size_t whole = bytes / piece, rest = bytes % piece;
+    if (whole > std::size_t(INT_MAX))
+        throw MpiFailed("a message of " + std::to_string(bytes) + " bytes is too long");
+    const mpi::Type one = mpi::item_of(piece);
+    const int lengths[2] = {int(whole), int(rest)};
+    const MPI_Aint starts[2] = {0, MPI_Aint(whole * piece)};
+    const MPI_Datatype types[2] = {one.type, MPI_BYTE};
+    mpi::Type all;
+    check(MPI_Type_create_struct(2, lengths, starts, types, &all.type), "MPI_Type_create_struct");
+    check(MPI_Type_commit(&all.type), "MPI_Type_commit");
+    return all;
+}
+
+/// How a message of this length is described to MPI.
+struct Layout {
+    mpi::Type own;
+    MPI_Datatype type = MPI_BYTE;
+    int count;
+    Layout(std::size_t bytes, std::size_t piece) : count(int(bytes))
+    {
+        if (bytes <= piece)
+            return;
+        own = long_item(bytes, piece);
+        type = own.type;
+        count = 1;
+    }
+};
+
+} // namespace
+
+// ---- start and end
+// -------------------------------------------------------------------------------------------------
+Environment::Environment(int& argc, char**& argv)
+{
+    ensure(!the_world(), "two MPI environments in one program");
+    int granted = 0;
+    check(MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &granted), "MPI_Init_thread");
+    if (granted < MPI_THREAD_FUNNELED)
+        throw MpiFailed("this MPI library grants no threads (MPI_THREAD_FUNNELED is needed)");
+    // HDF5 works on duplicates of these: they too must return their errors instead of ending the program.
+    check(MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+    check(MPI_Comm_set_errhandler(MPI_COMM_SELF, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+    auto handle = std::make_unique<Comm::Handle>();
+    check(MPI_Comm_dup(MPI_COMM_WORLD, &handle->comm), "MPI_Comm_dup");
+    the_world().reset(new Comm(std::move(handle)));
+}
+
+Environment::~Environment()
+{
+    the_world().reset();
+    MPI_Finalize();
+}
+
+Comm::Comm(std::unique_ptr<Handle> handle) : handle_(std::move(handle))
+{
+    check(MPI_Comm_set_errhandler(handle_->comm, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+    check(MPI_Comm_rank(handle_->comm, &rank_), "MPI_Comm_rank");
+    check(MPI_Comm_size(handle_->comm, &size_), "MPI_Comm_size");
+}
+
+Comm::~Comm() { MPI_Comm_free(&handle_->comm); }
+
+const Comm& Comm::world()
+{
+    ensure(the_world() != nullptr, "Comm::world() outside an Environment");
+    return *the_world();
+}
+
+void* Comm::native() const { return &handle_->comm; }
+
+void Comm::abort(int code) const
+{
+    std::fflush(nullptr);
+    MPI_Abort(MPI_COMM_WORLD, code);
+    std::abort();
+}
+
+// ---- all ranks at once
+// ---------------------------------------------------------------------------------------------
+void Comm::barrier() const { check(MPI_Barrier(handle_->comm), "MPI_Barrier"); }
+
+namespace
+{
+template <class T> void reduce(std::span<T> v, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
+{
+    check(MPI_Allreduce(MPI_IN_PLACE, v.data(), int(v.size()), type, op, comm), "MPI_Allreduce");
+}
+} // namespace
+
+void Comm::min(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_MIN, handle_->comm); }
+void Comm::max(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_MAX, handle_->comm); }
+void Comm::sum(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_SUM, handle_->comm); }
+void Comm::min(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_MIN, handle_->comm); }
+void Comm::max(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_MAX, handle_->comm); }
+void Comm::sum(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_SUM, handle_->comm); }
+
+std::int64_t Comm::sum_below(std::int64_t mine) const
+{
+    std::int64_t below = 0;
+    check(MPI_Exscan(&mine, &below, 1, MPI_INT64_T, MPI_SUM, handle_->comm), "MPI_Exscan");
+    return rank_ == 0 ? 0 : below;
+}
+
+void Comm::broadcast(std::span<std::byte> bytes, int root) const
+{
+    for (std::size_t at = 0; at < bytes.size(); at += largest_piece) {
+        const std::size_t n = std::min(largest_piece, bytes.size() - at);
+        check(MPI_Bcast(bytes.data() + at, int(n), MPI_BYTE, root, handle_->comm), "MPI_Bcast");
+    }
+}
+
+std::vector<std::vector<std::byte>> Comm::gather(std::span<const std::byte> mine, int root) const
+{
+    std::vector<std::vector<std::byte>> all;
+    const std::int64_t n = std::int64_t(mine.size());
+    std::vector<std::int64_t> sizes(rank_ == root ? std::size_t(size_) : 0);
+    check(MPI_Gather(&n, 1, MPI_INT64_T, sizes.data(), 1, MPI_INT64_T, root, handle_->comm), "MPI_Gather");
+    if (rank_ != root) {
+        if (n == 0)
+            return all;
+        const Layout layout(mine.size(), largest_piece);
+        check(MPI_Send(mine.data(), layout.count, layout.type, root, mpi::Gather, handle_->comm), "MPI_Send");
+        return all;
+    }
+    all.resize(std::size_t(size_));
+    std::vector<MPI_Request> requests;
+    for (int r = 0; r < size_; ++r) {
+        if (r == root || sizes[r] == 0)
+            continue;
+        all[r].resize(std::size_t(sizes[r]));
+        const Layout layout(all[r].size(), largest_piece);
+        requests.emplace_back();
+        check(MPI_Irecv(all[r].data(), layout.count, layout.type, r, mpi::Gather, handle_->comm,
+                        &requests.back()),
+              "MPI_Irecv");
+    }
+    all[root].assign(mine.begin(), mine.end());
+    check(MPI_Waitall(int(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
+    return all;
+}
+
+void Comm::allgather_bytes(const void* mine, void* all, std::size_t item) const
+{
+    const mpi::Type type = mpi::item_of(item);
+    check(MPI_Allgather(mine, 1, type.type, all, 1, type.type, handle_->comm), "MPI_Allgather");
+}
+
+void Comm::allgather_bytes(const void* mine, void* all, std::size_t item,
+                           std::span<const std::int64_t> counts) const
+{
+    std::vector<int> count, start;
+    std::int64_t total = 0;
+    for (const std::int64_t c : counts) {
+        count.push_back(int(c));
+        start.push_back(int(total));
+        total += c;
+        if (total > INT_MAX)
+            throw MpiFailed("an all-gather of more than 2^31 items");
+    }
+    const mpi::Type type = mpi::item_of(item);
+    check(MPI_Allgatherv(mine, count[rank_], type.type, all, count.data(), start.data(), type.type,
+                         handle_->comm),
+          "MPI_Allgatherv");
+}
+
+// ---- each to whom it likes
+// -----------------------------------------------------------------------------------------
+std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece) const
+{
+    ensure(piece > 0 && piece <= largest_piece, "exchange: pieces must hold 1 byte to 1 GiB");
+    // A rank that has left this round may already send in the next while others still listen here. Nobody can
+    // be two rounds ahead, so two tags in turn keep them apart.
+    const int tag = round_++ % 2 ? mpi::Odd : mpi::Even;
+    std::vector<Message> in;
+    std::vector<MPI_Request> sends;
+    for (Message& m : out) {
+        ensure(m.rank >= 0 && m.rank < size_, "exchange: a message to a rank that does not exist");
+        if (m.rank == rank_) {
+            in.push_back(std::move(m));
+            continue;
+        }
+        const Layout layout(m.bytes.size(), piece);
+        sends.emplace_back();
+        check(
+            MPI_Issend(m.bytes.data(), layout.count, layout.type, m.rank, tag, handle_->comm, &sends.back()),
+            "MPI_Issend");
+    }
+    // Synchronous sends complete when they are received: once all of mine are, I enter the barrier, and once
+    // everybody is in it, no message is under way.
+    MPI_Request all_done = MPI_REQUEST_NULL;
+    bool in_barrier = false;
+    for (int done = 0; !done;) {
+        int found = 0;
+        MPI_Message message;
+        MPI_Status status;
+        check(MPI_Improbe(MPI_ANY_SOURCE, tag, handle_->comm, &found, &message, &status), "MPI_Improbe");
+        if (found) {
+            MPI_Count bytes = 0;
+            check(MPI_Get_elements_x(&status, MPI_BYTE, &bytes), "MPI_Get_elements_x");
+            Message m{status.MPI_SOURCE, std::vector<std::byte>(std::size_t(bytes))};
+            const Layout layout(m.bytes.size(), piece);
+            check(MPI_Mrecv(m.bytes.data(), layout.count, layout.type, &message, MPI_STATUS_IGNORE),
+                  "MPI_Mrecv");
+            in.push_back(std::move(m));
+        } else if (in_barrier) {
+            check(MPI_Test(&all_done, &done, MPI_STATUS_IGNORE), "MPI_Test");
+        } else {
+            int sent = 0;
+            check(MPI_Testall(int(sends.size()), sends.data(), &sent, MPI_STATUSES_IGNORE), "MPI_Testall");
+            if (!sent)
+                continue;
+            check(MPI_Ibarrier(handle_->comm, &all_done), "MPI_Ibarrier");
+            in_barrier = true;
+        }
+    }
+    std::ranges::stable_sort(in, {}, &Message::rank);
+    return in;
+}
+
+NodePlace Comm::node_place() const
+{
+    MPI_Comm shared = MPI_COMM_NULL;
+    check(MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &shared),
+          "MPI_Comm_split_type");
+    NodePlace place{};
+    int lowest = rank_;
+    check(MPI_Comm_rank(shared, &place.rank), "MPI_Comm_rank");
+    check(MPI_Comm_size(shared, &place.size), "MPI_Comm_size");
+    check(MPI_Bcast(&lowest, 1, MPI_INT, 0, shared), "MPI_Bcast");
+    check(MPI_Comm_free(&shared), "MPI_Comm_free");
+    auto firsts = allgather(lowest);
+    std::ranges::sort(firsts);
+    firsts.erase(std::unique(firsts.begin(), firsts.end()), firsts.end());
+    place.nodes = int(firsts.size());
+    place.node = int(std::ranges::lower_bound(firsts, lowest) - firsts.begin());
+    return place;
+}
+
+} // namespace kuzure

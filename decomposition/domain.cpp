@@ -1,0 +1,484 @@
+#include "decomposition/domain.hpp"
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+
+namespace kuzure
+{
+namespace
+{
+
+std::array<double, 3> axes(Vector v) { return {v.x, v.y, v.z}; }
+
+double now()
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// ---- bytes of several lists in one message
+// -------------------------------------------------------------------------
+template <class T> void put(std::vector<std::byte>& to, std::span<const T> items)
+{
+    const std::uint64_t n = items.size();
+    const auto size = std::as_bytes(std::span(&n, 1)), bytes = std::as_bytes(items);
+    to.insert(to.end(), size.begin(), size.end());
+    to.insert(to.end(), bytes.begin(), bytes.end());
+}
+template <class T> std::vector<T> take(std::span<const std::byte>& from)
+{
+    std::uint64_t n = 0;
+    std::memcpy(&n, from.data(), sizeof n);
+    std::vector<T> items(n);
+    if (n)
+        std::memcpy(items.data(), from.data() + sizeof n, n * sizeof(T));
+    from = from.subspan(sizeof n + n * sizeof(T));
+    return items;
+}
+
+} // namespace
+
+// ---- blocks
+// --------------------------------------------------------------------------------------------------------
+Domain::Domain(const Comm& comm, Vector origin, Vector block_size, std::array<bool, 3> periodic,
+               Vector period_low, Vector period_length)
+    : comm_(comm), origin_(origin), size_(block_size), period_low_(period_low), period_length_(period_length)
+{
+    for (int a = 0; a < 3; ++a) {
+        const double size = axes(size_)[a], length = axes(period_length_)[a];
+        ensure(size > 0 && std::isfinite(size), "the size of a block is not positive");
+        if (!periodic[a])
+            continue;
+        const double n = std::round(length / size);
+        if (!(n >= 1 && n < block_limit && std::abs(n * size - length) <= 1e-9 * length))
+            throw BadInput(
+                fmt::format("the period along {} ({} m) is not a whole number of blocks of {} m: choose a "
+                            "block size that divides it",
+                            "xyz"[a], length, size));
+        period_[a] = std::int32_t(n);
+    }
+}
+
+bool Domain::raw_block(Vector x, Block& b) const
+{
+    const double k[3] = {std::floor((x.x - origin_.x) / size_.x), std::floor((x.y - origin_.y) / size_.y),
+                         std::floor((x.z - origin_.z) / size_.z)};
+    for (int a = 0; a < 3; ++a) {
+        if (!(k[a] >= -block_limit && k[a] < block_limit))
+            return false;
+        b[a] = std::int32_t(k[a]);
+    }
+    return true;
+}
+
+Block Domain::wrapped(Block b) const
+{
+    for (int a = 0; a < 3; ++a) {
+        if (!period_[a])
+            continue;
+        b[a] %= period_[a];
+        if (b[a] < 0)
+            b[a] += period_[a];
+    }
+    return b;
+}
+
+void Domain::complain(Vector x) const
+{
+    throw NumbersFailed(
+        fmt::format("a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into "
+                    "blocks: the run has blown up; try a smaller time step",
+                    x.x, x.y, x.z));
+}
+
+Block Domain::block_of(Vector x) const
+{
+    Block b;
+    if (!raw_block(x, b))
+        complain(x);
+    return wrapped(b);
+}
+
+int Domain::owner_of(const Block& asked) const
+{
+    ensure(is_cut_, "a domain is asked for owners before it is cut");
+    if (block_.empty())
+        return 0;
+    const Block b = wrapped(asked);
+    if (const int k = index_[b]; k >= 0)
+        return owner_[k];
+
+    // (largest difference, squared distance, lexicographic place): the least wins.
+    using Rank = std::tuple<std::int64_t, std::int64_t, int>;
+    const auto rank_of = [&](int k) {
+        std::int64_t largest = 0, squared = 0;
+        for (int a = 0; a < 3; ++a) {
+            std::int64_t d = std::abs(std::int64_t(block_[k][a]) - b[a]);
+            if (period_[a])
+                d = std::min(d, period_[a] - d);
+            largest = std::max(largest, d);
+            squared += d * d;
+        }
+        return Rank(largest, squared, k);
+    };
+    const Rank none(std::numeric_limits<std::int64_t>::max(), 0, 0);
+    Rank best = none;
+    constexpr int shells = 3; // looked up one by one; further away, the whole list is faster
+    for (int s = 1; s <= shells && best == none; ++s)
+        for (int i = -s; i <= s; ++i)
+            for (int j = -s; j <= s; ++j)
+                for (int l = -s; l <= s; l += std::abs(i) == s || std::abs(j) == s ? 1 : 2 * s) {
+                    const Block near = wrapped({b[0] + i, b[1] + j, b[2] + l});
+                    bool inside = true;
+                    for (const auto c : near)
+                        inside = inside && c >= -block_limit && c < block_limit;
+                    const int k = inside ? index_[near] : -1;
+                    if (k >= 0)
+                        best = std::min(best, rank_of(k));
+                }
+    if (best == none)
+        for (int k = 0; k < int(block_.size()); ++k)
+            best = std::min(best, rank_of(k));
+    return owner_[std::get<2>(best)];
+}
+
+// ---- cutting
+// -------------------------------------------------------------------------------------------------------
+CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo)
+{
+    const double start = now();
+    const auto lists = comm_.gather(std::as_bytes(mine));
+    std::vector<std::byte> result;
+    if (comm_.rank() == 0) {
+        std::string failure;
+        try {
+            std::vector<BlockWork> all;
+            std::vector<int> lister;
+            for (int r = 0; r < comm_.size(); ++r) {
+                const std::size_t n = lists[r].size() / sizeof(BlockWork), at = all.size();
+                all.resize(at + n);
+                if (n)
+                    std::memcpy(&all[at], lists[r].data(), n * sizeof(BlockWork));
+                lister.resize(at + n, r);
+            }
+            BlockGrid grid;
+            grid.period = period_;
+            grid.row_bytes = halo.row_bytes;
+            if (halo.reach > 0)
+                for (int a = 0; a < 3; ++a)
+                    grid.reach[a] = halo.reach / axes(size_)[a];
+            const BlockGraph g = block_graph(all, grid);
+
+            // A block was where most of its work was listed.
+            BlockIndex index;
+            index.reserve(g.block.size());
+            for (int b = 0; b < g.size(); ++b)
+                index.set(g.block[b], b);
+            std::vector<std::map<int, double>> shares(g.block.size());
+            for (std::size_t k = 0; k < all.size(); ++k)
+                shares[index[all[k].block]][lister[k]] += all[k].work;
+            std::vector<int> previous(g.block.size(), -1);
+            for (int b = 0; b < g.size(); ++b)
+                previous[b] =
+                    std::ranges::max_element(shares[b], {}, [](const auto& s) { return s.second; })->first;
+
+            const std::vector<int> owner = partition(g, comm_.size(), method, &previous);
+            const CutReport r = describe(g, owner, comm_.size());
+            put(result, std::span<const char>());
+            put(result, std::span<const Block>(g.block));
+            put(result, std::span<const int>(owner));
+            const double numbers[] = {double(r.parts), double(r.blocks), r.imbalance, r.cut_bytes};
+            put(result, std::span<const double>(numbers));
+            put(result, std::span<const double>(r.work));
+            put(result, std::span<const double>(r.particles));
+            put(result, std::span<const double>(r.ghosts));
+            put(result, std::span<const int>(r.peers));
+        } catch (const std::exception& e) {
+            failure = e.what();
+        }
+        if (!failure.empty()) {
+            result.clear();
+            put(result, std::span<const char>(failure));
+        }
+    }
+    result.resize(std::size_t(comm_.max(std::int64_t(result.size()))));
+    comm_.broadcast(std::span(result));
+    std::span<const std::byte> from(result);
+    if (const auto failure = take<char>(from); !failure.empty())
+        throw Broken("the domain cannot be cut: " + std::string(failure.begin(), failure.end()));
+    block_ = take<Block>(from);
+    owner_ = take<int>(from);
+    CutReport r;
+    const auto numbers = take<double>(from);
+    r.parts = int(numbers[0]);
+    r.blocks = int(numbers[1]);
+    r.imbalance = numbers[2];
+    r.cut_bytes = numbers[3];
+    r.work = take<double>(from);
+    r.particles = take<double>(from);
+    r.ghosts = take<double>(from);
+    r.peers = take<int>(from);
+
+    index_ = {};
+    index_.reserve(block_.size());
+    for (int b = 0; b < int(block_.size()); ++b)
+        index_.set(block_[b], b);
+    is_cut_ = true;
+    r.seconds = comm_.max(now() - start);
+    return r;
+}
+
+// ---- migration
+// -----------------------------------------------------------------------------------------------------
+Domain::Moved Domain::migrate(Particles& p) const
+{
+    ensure(is_cut_, "particles migrate before the domain is cut");
+    const auto x = std::as_const(p)[field::position];
+    const Index n = p.size();
+    std::vector<int> owner(n);
+    Index lost = -1;
+#pragma omp parallel reduction(max : lost)
+    {
+        Block last{};
+        int last_owner = -1;
+#pragma omp for schedule(static)
+        for (Index i = 0; i < n; ++i) {
+            Block b;
+            if (!raw_block(x[i], b)) {
+                lost = std::max(lost, i);
+                continue;
+            }
+            if (last_owner < 0 || b != last)
+                last = b, last_owner = owner_of(b);
+            owner[i] = last_owner;
+        }
+    }
+    // All ranks stop together; those whose particles are sound name no place.
+    if (comm_.any(lost >= 0)) {
+        if (lost >= 0)
+            complain(x[lost]);
+        throw NumbersFailed(
+            "a soil particle of another rank left anything that can be cut into blocks: the run has "
+            "blown up; try a smaller time step");
+    }
+
+    std::map<int, std::vector<Index>> leaving;
+    std::vector<Index> stay;
+    stay.reserve(n);
+    for (Index i = 0; i < n; ++i) {
+        if (owner[i] == comm_.rank())
+            stay.push_back(i);
+        else
+            leaving[owner[i]].push_back(i);
+    }
+    Moved moved;
+    std::vector<Message> out;
+    for (const auto& [rank, which] : leaving) {
+        moved.left += std::int64_t(which.size());
+        out.push_back({rank, {}});
+        p.pack(which, out.back().bytes);
+    }
+    const auto in = comm_.exchange(std::move(out));
+    if (moved.left)
+        p.gather(stay);
+    for (const Message& m : in) {
+        ensure(p.size() + std::int64_t(m.bytes.size() / p.bytes_per_particle()) <
+                   std::numeric_limits<Index>::max(),
+               "more than 2^31 particles on one rank");
+        p.unpack(m.bytes);
+    }
+    moved.arrived = p.size() - std::int64_t(stay.size());
+    return moved;
+}
+
+// ---- who needs to see whom
+// -----------------------------------------------------------------------------------------
+namespace
+{
+
+struct Bounds {
+    double low[3], high[3];
+    static Bounds none()
+    {
+        const double inf = std::numeric_limits<double>::infinity();
+        return {{inf, inf, inf}, {-inf, -inf, -inf}};
+    }
+    bool empty() const { return low[0] > high[0]; }
+    void add(const double* l, const double* h)
+    {
+        for (int a = 0; a < 3; ++a)
+            low[a] = std::min(low[a], l[a]), high[a] = std::max(high[a], h[a]);
+    }
+};
+
+/// Squared distance of box a, moved by d, from box b.
+double squared_distance(const Bounds& a, const double* d, const Bounds& b)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        const double gap = std::max({0.0, b.low[k] - (a.high[k] + d[k]), (a.low[k] + d[k]) - b.high[k]});
+        sum += gap * gap;
+    }
+    return sum;
+}
+
+} // namespace
+
+HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
+{
+    HaloPlan plan;
+    std::vector<int> shifts;
+    for (int s = 0; s < 27; ++s) {
+        const int d[3] = {s % 3 - 1, s / 3 % 3 - 1, s / 9 - 1};
+        plan.shift[s] = {d[0] * period_length_.x, d[1] * period_length_.y, d[2] * period_length_.z};
+        bool possible = true;
+        for (int a = 0; a < 3; ++a)
+            possible = possible && (d[a] == 0 || period_[a] > 0);
+        if (!possible)
+            plan.shift[s] = {};
+        else
+            shifts.push_back(s);
+    }
+    for (int a = 0; a < 3; ++a)
+        ensure(period_[a] == 0 || reach <= axes(period_length_)[a], "the halo reaches further than a period");
+    const auto shift = [&](int s) { return axes(plan.shift[s]); };
+
+    // The particles by block, and the box that each block's particles fill. Blocks are not wrapped here: one
+    // across a period's seam would fill a box as long as the period.
+    std::vector<std::uint64_t> key(n);
+    double largest = 0;
+    bool lost = false, outside = false;
+    const auto low = axes(period_low_), length = axes(period_length_);
+#pragma omp parallel for schedule(static) reduction(max : largest) reduction(|| : lost, outside)
+    for (Index i = 0; i < n; ++i) {
+        Block b;
+        if (!raw_block(x[i], b)) {
+            lost = true;
+            continue;
+        }
+        key[i] = key_of(b);
+        for (int a = 0; a < 3; ++a) {
+            const double c = x.column[a][i];
+            largest = std::max(largest, std::abs(c));
+            const double slack = 1e-9 * length[a];
+            if (period_[a])
+                outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
+        }
+    }
+    if (comm_.any(lost))
+        throw NumbersFailed(
+            "a soil particle left anything that can be cut into blocks: the run has blown up; try a "
+            "smaller time step");
+    ensure(!comm_.any(outside), "a halo is planned while particles lie outside the period");
+
+    std::unordered_map<std::uint64_t, int> local;
+    std::vector<Bounds> box;
+    std::vector<int> group(n);
+    std::vector<Index> first{0};
+    for (Index i = 0; i < n; ++i) {
+        if (i > 0 && key[i] == key[i - 1]) {
+            group[i] = group[i - 1];
+        } else {
+            group[i] = local.try_emplace(key[i], int(box.size())).first->second;
+            if (group[i] == int(box.size()))
+                box.push_back(Bounds::none()), first.push_back(0);
+        }
+        ++first[group[i] + 1];
+    }
+    for (std::size_t g = 1; g < first.size(); ++g)
+        first[g] += first[g - 1];
+    std::vector<Index> member(n);
+    {
+        auto next = first;
+        for (Index i = 0; i < n; ++i)
+            member[next[group[i]]++] = i;
+    }
+    const int n_boxes = int(box.size());
+#pragma omp parallel for schedule(dynamic)
+    for (int g = 0; g < n_boxes; ++g)
+        for (Index k = first[g]; k < first[g + 1]; ++k) {
+            const Vector v = x[member[k]];
+            const double at[3] = {v.x, v.y, v.z};
+            box[g].add(at, at);
+        }
+    Bounds whole = Bounds::none();
+    for (const auto& b : box)
+        whole.add(b.low, b.high);
+
+    // Rounding must not lose a pair that the solver, adding the shift on the other side, finds just inside.
+    const double extent = std::max({largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])});
+    const double safe = reach * (1 + 1e-9) + 1e-14 * comm_.max(extent), reach2 = safe * safe;
+
+    // First whole ranks, then their blocks: each rank tells those near it which of its boxes are near them.
+    const auto wholes = comm_.allgather(whole);
+    std::vector<Parcel<Bounds>> out;
+    for (int r = 0; r < comm_.size(); ++r) {
+        if (whole.empty() || wholes[r].empty())
+            continue;
+        Parcel<Bounds> p{r, {}};
+        if (r == comm_.rank()) {
+            if (shifts.size() > 1)
+                p.items = box;
+        } else {
+            for (const auto& b : box)
+                if (std::ranges::any_of(shifts, [&](int s) {
+                        return squared_distance(b, shift(s).data(), wholes[r]) <= reach2;
+                    }))
+                    p.items.push_back(b);
+        }
+        if (!p.items.empty())
+            out.push_back(std::move(p));
+    }
+    const auto theirs = comm_.exchange(out);
+
+    struct Entry {
+        int peer;
+        HaloPlan::Send send;
+    };
+    std::vector<std::vector<Entry>> found(n_boxes);
+#pragma omp parallel for schedule(dynamic)
+    for (int g = 0; g < n_boxes; ++g) {
+        std::vector<const Bounds*> near;
+        for (int peer = 0; peer < int(theirs.size()); ++peer) {
+            const auto& them = theirs[peer];
+            for (const int s : shifts) {
+                if (them.rank == comm_.rank() && s == HaloPlan::no_shift)
+                    continue;
+                const auto d = shift(s);
+                if (squared_distance(box[g], d.data(), wholes[them.rank]) > reach2)
+                    continue;
+                near.clear();
+                for (const auto& b : them.items)
+                    if (squared_distance(box[g], d.data(), b) <= reach2)
+                        near.push_back(&b);
+                if (near.empty())
+                    continue;
+                for (Index k = first[g]; k < first[g + 1]; ++k) {
+                    const Index i = member[k];
+                    const Vector v = x[i];
+                    const Bounds at{{v.x, v.y, v.z}, {v.x, v.y, v.z}};
+                    for (const Bounds*& b : near) {
+                        if (squared_distance(at, d.data(), *b) > reach2)
+                            continue;
+                        found[g].push_back({peer, {i, s}});
+                        std::swap(b, near.front()); // the next particle is probably near the same box
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    for (const auto& them : theirs)
+        plan.peers.push_back({them.rank, {}});
+    for (const auto& f : found)
+        for (const Entry& e : f)
+            plan.peers[e.peer].sends.push_back(e.send);
+    std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
+    for (auto& p : plan.peers)
+        std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
+    return plan;
+}
+
+} // namespace kuzure

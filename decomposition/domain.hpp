@@ -1,0 +1,81 @@
+#pragma once
+// Who owns what: space in blocks, blocks to ranks. Everything here happens at rebuild steps that all ranks
+// agree on; a cut decides who computes a particle, never a bit of the result.
+#include "decomposition/comm.hpp"
+#include "decomposition/halo.hpp"
+#include "decomposition/partition.hpp"
+#include "solver/core/particles.hpp"
+#include <string>
+
+namespace kuzure
+{
+
+/// How a cut weighs the halo: its reach in m (0: a quarter of a block) and the bytes of a ghost's record.
+struct HaloCost {
+    double reach = 0;
+    double row_bytes = 128;
+};
+
+class Domain
+{
+  public:
+    /// Blocks of this size from this origin (m); on a periodic axis the period must hold a whole number of
+    /// blocks, else BadInput.
+    Domain(const Comm&, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low,
+           Vector period_length);
+
+    /// floor((x - origin)/size) by axis, wrapped to 0 .. n-1 on periodic axes. Throws NumbersFailed for a
+    /// position that is not finite or more than 2^20 blocks away.
+    Block block_of(Vector x) const;
+
+    /// Cuts anew; collective. `mine` lists what this rank's blocks cost; equal blocks of several ranks add
+    /// up. Labels stay with the rank that listed most of a part's work. The report is the same on every rank,
+    /// its seconds the longest of all ranks.
+    CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {});
+
+    /// The same on every rank, for any block: where no soil was at the last cut, the owner of the nearest
+    /// block that had some (largest difference of an axis, then distance, then lexicographic order). Throws
+    /// Broken before cut().
+    int owner_of(const Block&) const;
+    int owner_of(Vector x) const { return owner_of(block_of(x)); }
+
+    struct Moved {
+        std::int64_t left = 0, arrived = 0;
+    };
+    /// Sends every particle to its owner; collective. Those that stay keep their order, arrivals follow by
+    /// rank.
+    Moved migrate(Particles&) const;
+
+    /// Who needs to see this rank's particles; collective. Every particle within `reach` (m) of a particle of
+    /// another rank, or of any particle across a period, is sent there, whoever owns it and whether or not
+    /// its block held soil at the last cut. On periodic axes positions must lie in [low, low + length] and
+    /// reach <= length.
+    HaloPlan plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const;
+    HaloPlan plan_halo(const Particles& p, double reach) const
+    {
+        return plan_halo(p[field::position], p.size(), reach);
+    }
+
+    const Comm& comm() const { return comm_; }
+    /// Blocks that held soil at the last cut, in lexicographic order, and their owners.
+    std::span<const Block> blocks() const { return block_; }
+    std::span<const int> owners() const { return owner_; }
+    /// Blocks per period by axis; 0 where open.
+    const std::array<std::int32_t, 3>& period() const { return period_; }
+
+  private:
+    /// Without the wrap; nothing where block_of() would throw.
+    bool raw_block(Vector x, Block& b) const;
+    Block wrapped(Block) const;
+    [[noreturn]] void complain(Vector x) const;
+
+    const Comm& comm_;
+    Vector origin_, size_, period_low_, period_length_;
+    std::array<std::int32_t, 3> period_{};
+    std::vector<Block> block_;
+    std::vector<int> owner_;
+    BlockIndex index_;
+    bool is_cut_ = false;
+};
+
+} // namespace kuzure

@@ -1,0 +1,143 @@
+#pragma once
+// Ghosts: which owned particles which rank needs to see, and their records' way there, once per step.
+// Periodic images of a rank's own particles take the same road without MPI.
+#include "decomposition/comm.hpp"
+#include "solver/core/particles.hpp"
+#include "solver/core/tensor.hpp"
+#include <array>
+
+namespace kuzure
+{
+
+/// What is sent to whom until the next rebuild.
+struct HaloPlan {
+    static constexpr int no_shift = 13;
+    struct Send {
+        Index owned;
+        std::int32_t shift; // index into HaloPlan::shift; no_shift is zero
+    };
+    struct Peer {
+        int rank; // this rank itself for periodic images of its own particles
+        std::vector<Send> sends;
+    };
+    std::vector<Peer> peers;        // by rank; sends by owned index, then shift
+    std::array<Vector, 27> shift{}; // added to the owner's position, m
+};
+
+/// What the solver must know to put a ghost in its place: one row of Halo::ghosts().
+struct Ghost {
+    Vector sorted_position; // shifted, m
+    std::int64_t id;
+    std::int32_t soil;
+};
+
+/// The exchange of one plan. Rows arrive by sending rank, those of one rank in its plan's order. Main thread
+/// only.
+class Halo
+{
+  public:
+    /// Collective. The plan's counts are exchanged; rows have `row_bytes` bytes, packed without gaps.
+    Halo(const Comm&, HaloPlan, std::size_t row_bytes);
+    Halo(Halo&&) noexcept;
+    Halo& operator=(Halo&&) noexcept;
+    ~Halo();
+
+    /// Rows that arrive in each refresh, own images included.
+    Index n_ghosts() const;
+    const HaloPlan& plan() const;
+
+    /// One Row per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Row.
+    /// Collective.
+    template <class Row, class Make> std::vector<Row> collect(Make make) const
+    {
+        static_assert(std::is_trivially_copyable_v<Row>);
+        std::vector<Parcel<Row>> out;
+        for (const auto& peer : plan().peers) {
+            Parcel<Row> p{peer.rank, {}};
+            p.items.reserve(peer.sends.size());
+            for (const auto& s : peer.sends)
+                p.items.push_back(make(s.owned, plan().shift[s.shift]));
+            if (!p.items.empty())
+                out.push_back(std::move(p));
+        }
+        std::vector<Row> rows;
+        for (const auto& p : comm().exchange(out))
+            rows.insert(rows.end(), p.items.begin(), p.items.end());
+        ensure(rows.size() == std::size_t(n_ghosts()),
+               "a halo delivers another number of ghosts than planned");
+        return rows;
+    }
+    /// Where each ghost was sorted (shifted), its id and soil (0 where the store has no soil column).
+    /// Collective.
+    std::vector<Ghost> ghosts(const Particles&) const;
+
+    /// Row k of an arrival goes to slot[k] from now on; the identity before the first call.
+    void place(std::span<const Index> slot);
+
+    /// Starts a refresh: copy(Index owned, Vector shift, std::byte* to) writes one row; threads call it at
+    /// once.
+    template <class Copy> void begin(Copy copy)
+    {
+        start_receives();
+        for (int peer = 0; peer < n_out(); ++peer) {
+            const Out out = out_[peer];
+            const std::size_t bytes = row_bytes_;
+            const auto& shift = plan().shift;
+#pragma omp parallel for schedule(static) if (out.n > parallel_rows)
+            for (Index k = 0; k < out.n; ++k)
+                copy(out.sends[k].owned, shift[out.sends[k].shift], out.rows + std::size_t(k) * bytes);
+            start_send(peer);
+        }
+    }
+    /// Lets MPI move what is under way; call it between chunks of work.
+    void progress();
+    /// Ends the refresh: waits, and hands over each row by put(Index slot, const std::byte* row); threads
+    /// call it at once. Throws Broken without a begin().
+    template <class Put> void arrive(Put put)
+    {
+        for (int peer; (peer = next_arrival()) >= 0;) {
+            const In in = in_[peer];
+            const std::size_t bytes = row_bytes_;
+            const Index* slot = slot_.data() + in.first;
+#pragma omp parallel for schedule(static) if (in.n > parallel_rows)
+            for (Index k = 0; k < in.n; ++k)
+                put(slot[k], static_cast<const std::byte*>(in.rows) + std::size_t(k) * bytes);
+        }
+        finish();
+    }
+
+    std::size_t row_bytes() const { return row_bytes_; }
+    /// This rank's sends over MPI in one refresh.
+    std::int64_t bytes_per_refresh() const { return bytes_; }
+    int messages_per_refresh() const { return messages_; }
+    std::int64_t refreshes() const { return refreshes_; }
+
+  private:
+    static constexpr Index parallel_rows = 2048;
+    struct Out {
+        const HaloPlan::Send* sends;
+        Index n;
+        std::byte* rows; // for own images, straight into the arrivals
+    };
+    struct In {
+        Index first, n;
+        std::byte* rows;
+    };
+    const Comm& comm() const;
+    int n_out() const { return int(out_.size()); }
+    void start_receives();
+    void start_send(int peer);
+    int next_arrival();
+    void finish();
+
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+    std::vector<Out> out_;
+    std::vector<In> in_;
+    std::vector<Index> slot_;
+    std::size_t row_bytes_ = 0;
+    std::int64_t bytes_ = 0, refreshes_ = 0;
+    int messages_ = 0;
+};
+
+} // namespace kuzure

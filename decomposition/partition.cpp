@@ -1,0 +1,522 @@
+#include "decomposition/partition.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <cmath>
+#include <metis.h>
+#include <numeric>
+#include <utility>
+
+namespace kuzure
+{
+
+const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curve"; }
+
+// ---- the graph
+// -----------------------------------------------------------------------------------------------------
+BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
+{
+    for (const auto& b : given) {
+        for (int a = 0; a < 3; ++a) {
+            ensure(b.block[a] >= -block_limit && b.block[a] < block_limit,
+                   "a block lies beyond the block limit");
+            ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]),
+                   "a block lies outside its period");
+        }
+        ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
+               "a block's work or particle count is negative or not a number");
+    }
+    std::vector<BlockWork> all(given.begin(), given.end());
+    std::ranges::stable_sort(all, {}, &BlockWork::block);
+
+    BlockGraph g;
+    g.grid = grid;
+    for (const auto& b : all) {
+        if (g.block.empty() || g.block.back() != b.block) {
+            g.block.push_back(b.block);
+            g.work.push_back(0);
+            g.particles.push_back(0);
+        }
+        g.work.back() += b.work;
+        g.particles.back() += b.particles;
+    }
+
+    BlockIndex index;
+    index.reserve(g.block.size());
+    for (int b = 0; b < g.size(); ++b)
+        index.set(g.block[b], b);
+    for (int b = 0; b < g.size(); ++b) {
+        g.first.push_back(g.link.size());
+        for (int code = 0; code < 27; ++code) {
+            const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1),
+                                               std::int8_t(code % 3 - 1)};
+            if (code == 13)
+                continue;
+            Block there = g.block[b];
+            double share = 1; // of a block's particles within reach of the other block
+            bool inside = true;
+            for (int a = 0; a < 3; ++a) {
+                there[a] += d[a];
+                if (grid.period[a])
+                    there[a] = (there[a] + grid.period[a]) % grid.period[a];
+                inside = inside && there[a] >= -block_limit && there[a] < block_limit;
+                if (d[a])
+                    share *= std::min(1.0, grid.reach[a]);
+            }
+            const int n = inside ? index[there] : -1;
+            if (n >= 0)
+                g.link.push_back({n, d, share * grid.row_bytes * (g.particles[b] + g.particles[n])});
+        }
+    }
+    g.first.push_back(g.link.size());
+    return g;
+}
+
+// ---- what a cut is worth
+// -------------------------------------------------------------------------------------------
+namespace
+{
+
+/// A block seen along one axis: the shares of it within reach of its low face, of its high face, of both, of
+/// none.
+struct Layer {
+    double share;
+    bool low, high;
+};
+std::array<Layer, 3> layers(double reach)
+{
+    const double r = std::min(1.0, reach);
+    if (r <= 0.5)
+        return {{{r, true, false}, {1 - 2 * r, false, false}, {r, false, true}}};
+    return {{{1 - r, true, false}, {2 * r - 1, true, true}, {1 - r, false, true}}};
+}
+
+} // namespace
+
+CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
+{
+    ensure(int(part.size()) == g.size(), "a cut has as many entries as the graph has blocks");
+    CutReport r;
+    r.parts = parts;
+    r.blocks = g.size();
+    r.work.assign(parts, 0);
+    r.particles.assign(parts, 0);
+    r.ghosts.assign(parts, 0);
+    r.peers.assign(parts, 0);
+    for (int b = 0; b < g.size(); ++b) {
+        r.work[part[b]] += g.work[b];
+        r.particles[part[b]] += g.particles[b];
+    }
+    const double total = std::accumulate(r.work.begin(), r.work.end(), 0.0);
+    if (total > 0)
+        r.imbalance = *std::ranges::max_element(r.work) * parts / total;
+
+    const auto x = layers(g.grid.reach[0]), y = layers(g.grid.reach[1]), z = layers(g.grid.reach[2]);
+    const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
+    std::vector<std::vector<int>> sends(parts);
+    struct Wish {
+        int part;
+        bool image; // reaches itself or its own part through a period: each such direction is a ghost of its
+                    // own
+        std::array<std::int8_t, 3> d;
+    };
+    std::vector<Wish> wishes;
+    for (int b = 0; b < g.size(); ++b) {
+        wishes.clear();
+        for (const auto& l : g.links(b)) {
+            bool image = false;
+            for (int a = 0; a < 3; ++a)
+                image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
+            if (part[l.block] != part[b] || image)
+                wishes.push_back({part[l.block], image, l.d});
+        }
+        std::ranges::stable_sort(wishes, {}, [](const Wish& w) { return std::pair(w.part, w.image); });
+        for (std::size_t from = 0, to; from < wishes.size(); from = to) {
+            to = from;
+            while (to < wishes.size() && wishes[to].part == wishes[from].part &&
+                   wishes[to].image == wishes[from].image)
+                ++to;
+            double share = 0;
+            for (const auto& lx : x)
+                for (const auto& ly : y)
+                    for (const auto& lz : z)
+                        for (std::size_t w = from; w < to; ++w) {
+                            const auto& d = wishes[w].d;
+                            if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2]))
+                                continue;
+                            share += lx.share * ly.share * lz.share;
+                            break;
+                        }
+            const double rows = share * g.particles[b];
+            r.ghosts[wishes[from].part] += rows;
+            if (wishes[from].part == part[b])
+                continue;
+            r.cut_bytes += rows * g.grid.row_bytes;
+            sends[part[b]].push_back(wishes[from].part);
+        }
+    }
+    for (int p = 0; p < parts; ++p) {
+        std::ranges::sort(sends[p]);
+        r.peers[p] = int(std::unique(sends[p].begin(), sends[p].end()) - sends[p].begin());
+    }
+    return r;
+}
+
+// ---- cutting
+// -------------------------------------------------------------------------------------------------------
+std::uint64_t hilbert_index(std::array<std::uint32_t, 3> x, int bits)
+{
+    const std::uint32_t top = std::uint32_t(1) << (bits - 1);
+    for (std::uint32_t q = top; q > 1; q >>= 1) {
+        const std::uint32_t p = q - 1;
+        for (int i = 0; i < 3; ++i) {
+            if (x[i] & q) {
+                x[0] ^= p;
+            } else {
+                const std::uint32_t t = (x[0] ^ x[i]) & p;
+                x[0] ^= t;
+                x[i] ^= t;
+            }
+        }
+    }
+    for (int i = 1; i < 3; ++i)
+        x[i] ^= x[i - 1];
+    std::uint32_t t = 0;
+    for (std::uint32_t q = top; q > 1; q >>= 1)
+        if (x[2] & q)
+            t ^= q - 1;
+    for (auto& c : x)
+        c ^= t;
+    std::uint64_t index = 0;
+    for (int bit = bits - 1; bit >= 0; --bit)
+        for (int i = 0; i < 3; ++i)
+            index = index << 1 | (x[i] >> bit & 1);
+    return index;
+}
+
+namespace
+{
+
+using Cut = std::vector<int>;
+
+/// Pieces of equal work along the Hilbert curve.
+Cut hilbert_cut(const BlockGraph& g, int parts)
+{
+    Block low = g.block[0], high = g.block[0];
+    for (const auto& b : g.block)
+        for (int a = 0; a < 3; ++a)
+            low[a] = std::min(low[a], b[a]), high[a] = std::max(high[a], b[a]);
+    int bits = 1;
+    for (int a = 0; a < 3; ++a)
+        while ((high[a] - low[a]) >> bits)
+            ++bits;
+    std::vector<std::pair<std::uint64_t, int>> curve;
+    for (int b = 0; b < g.size(); ++b) {
+        std::array<std::uint32_t, 3> x;
+        for (int a = 0; a < 3; ++a)
+            x[a] = std::uint32_t(g.block[b][a] - low[a]);
+        curve.emplace_back(hilbert_index(x, bits), b);
+    }
+    std::ranges::sort(curve);
+    const double total = std::accumulate(g.work.begin(), g.work.end(), 0.0);
+    Cut part(g.size());
+    double below = 0;
+    for (int k = 0; k < g.size(); ++k) {
+        const int b = curve[k].second;
+        const double middle = total > 0 ? (below + 0.5 * g.work[b]) / total : (k + 0.5) / g.size();
+        part[b] = std::min(parts - 1, int(middle * parts));
+        below += g.work[b];
+    }
+    return part;
+}
+
+/// The graph as METIS takes it: no self-loops, no double edges, integer weights well below 2^31 in sum.
+struct MetisGraph {
+    std::vector<idx_t> first, neighbour, bytes, work;
+    bool connected;
+
+    MetisGraph(const BlockGraph& g, int parts)
+    {
+        // A block heavier than a part is a part of its own whatever METIS does: to it, it weighs as much as a
+        // part, or its bisections would run out of blocks. Fewer parts are left for the lighter ones, hence
+        // in turn.
+        std::vector<double> load = g.work;
+        std::ranges::sort(load, std::greater{});
+        double all_work = std::accumulate(load.begin(), load.end(), 0.0), most = all_work;
+        for (std::size_t k = 0; k < load.size() && int(k) < parts; ++k) {
+            most = all_work / (parts - int(k));
+            if (load[k] <= most)
+                break;
+            all_work -= load[k];
+        }
+        load = g.work;
+        for (double& w : load)
+            w = std::min(w, most);
+        all_work = std::accumulate(load.begin(), load.end(), 0.0);
+        double all_bytes = 0;
+        for (const auto& l : g.link)
+            all_bytes += l.bytes;
+        const double largest = 1 << 28;
+        std::vector<std::pair<idx_t, double>> edges;
+        for (int b = 0; b < g.size(); ++b) {
+            first.push_back(idx_t(neighbour.size()));
+            work.push_back(all_work > 0 ? 1 + idx_t(load[b] / all_work * largest) : 1);
+            edges.clear();
+            for (const auto& l : g.links(b))
+                if (l.block != b)
+                    edges.emplace_back(l.block, l.bytes);
+            std::ranges::sort(edges);
+            for (std::size_t e = 0; e < edges.size(); ++e) {
+                const idx_t weight = 1 + idx_t(edges[e].second / std::max(all_bytes, 1.0) * largest);
+                if (e && edges[e].first == edges[e - 1].first) {
+                    bytes.back() += weight;
+                } else {
+                    neighbour.push_back(edges[e].first);
+                    bytes.push_back(weight);
+                }
+            }
+        }
+        first.push_back(idx_t(neighbour.size()));
+
+        std::vector<int> queue{0};
+        std::vector<char> seen(g.size(), 0);
+        seen[0] = 1;
+        for (std::size_t k = 0; k < queue.size(); ++k)
+            for (idx_t e = first[queue[k]]; e < first[queue[k] + 1]; ++e)
+                if (!std::exchange(seen[neighbour[e]], 1))
+                    queue.push_back(neighbour[e]);
+        connected = int(queue.size()) == g.size();
+    }
+};
+
+/// Up to here several cuts are tried; larger graphs would take minutes.
+constexpr int small_graph = 10000;
+
+enum class Way { Kway, ContiguousKway, Bisection };
+
+/// Nothing where METIS fails.
+std::optional<Cut> metis_cut(MetisGraph& g, int parts, Way way)
+{
+    idx_t n = idx_t(g.work.size());
+    idx_t options[METIS_NOPTIONS];
+    METIS_SetDefaultOptions(options);
+    options[METIS_OPTION_NUMBERING] = 0;
+    options[METIS_OPTION_SEED] = 1;
+    options[METIS_OPTION_NCUTS] = n <= small_graph ? 4 : 1;
+    options[METIS_OPTION_NITER] = 20;
+    options[METIS_OPTION_UFACTOR] = way == Way::Bisection ? 1 : 20; // tolerated imbalance in 1/1000
+    idx_t constraints = 1, k = parts, cut = 0;
+    std::vector<idx_t> part(g.work.size());
+    int rc = METIS_OK;
+    if (way == Way::Bisection) {
+        rc = METIS_PartGraphRecursive(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(),
+                                      nullptr, g.bytes.data(), &k, nullptr, nullptr, options, &cut,
+                                      part.data());
+    } else {
+        options[METIS_OPTION_CONTIG] = way == Way::ContiguousKway;
+        rc = METIS_PartGraphKway(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(), nullptr,
+                                 g.bytes.data(), &k, nullptr, nullptr, options, &cut, part.data());
+    }
+    if (rc != METIS_OK)
+        return std::nullopt;
+    for (const idx_t p : part)
+        if (p < 0 || p >= parts)
+            return std::nullopt;
+    return Cut(part.begin(), part.end());
+}
+
+/// Parts' loads while blocks move.
+struct Loads {
+    const BlockGraph& g;
+    Cut& part;
+    std::vector<double> work;
+    std::vector<int> blocks;
+
+    Loads(const BlockGraph& graph, Cut& cut, int parts)
+        : g(graph), part(cut), work(parts, 0.0), blocks(parts, 0)
+    {
+        for (int b = 0; b < g.size(); ++b)
+            work[part[b]] += g.work[b], ++blocks[part[b]];
+    }
+    void move(int b, int to)
+    {
+        work[part[b]] -= g.work[b], --blocks[part[b]];
+        part[b] = to;
+        work[to] += g.work[b], ++blocks[to];
+    }
+};
+
+/// Gives every empty part the block that costs the heaviest part least halo. Needs parts <= blocks.
+void fill_empty_parts(const BlockGraph& g, Cut& part, int parts)
+{
+    Loads loads(g, part, parts);
+    for (int p = 0; p < parts; ++p) {
+        if (loads.blocks[p] > 0)
+            continue;
+        int from = -1;
+        for (int q = 0; q < parts; ++q)
+            if (loads.blocks[q] > 1 && (from < 0 || loads.work[q] > loads.work[from]))
+                from = q;
+        int best = -1;
+        double least = 0;
+        for (int b = 0; b < g.size(); ++b) {
+            if (part[b] != from)
+                continue;
+            double ties = 0;
+            for (const auto& l : g.links(b))
+                ties += part[l.block] == from ? l.bytes : -l.bytes;
+            if (best < 0 || ties < least)
+                best = b, least = ties;
+        }
+        loads.move(best, p);
+    }
+}
+
+/// Moves rim blocks from heavier to lighter neighbouring parts until the heaviest part is within `target` of
+/// the mean or nothing helps. Each move lowers the sum of squared loads, so it ends.
+void even_out(const BlockGraph& g, Cut& part, int parts, double target)
+{
+    Loads loads(g, part, parts);
+    const double mean = std::accumulate(loads.work.begin(), loads.work.end(), 0.0) / parts;
+    if (!(mean > 0))
+        return;
+    std::vector<std::vector<int>> members(parts);
+    std::vector<int> order(parts);
+    std::vector<double> ties(parts, 0.0);
+    for (int pass = 0; pass < 40; ++pass) {
+        if (*std::ranges::max_element(loads.work) <= target * mean)
+            return;
+        for (auto& m : members)
+            m.clear();
+        for (int b = 0; b < g.size(); ++b)
+            members[part[b]].push_back(b);
+        std::iota(order.begin(), order.end(), 0);
+        std::ranges::stable_sort(order, [&](int a, int b) { return loads.work[a] > loads.work[b]; });
+        bool moved = false;
+        for (const int p : order) {
+            // One block per part and pass: the loads around it change, so look again before the next.
+            if (loads.work[p] <= mean || loads.blocks[p] < 2)
+                continue;
+            int best = -1, to = -1;
+            double most = 0;
+            for (const int b : members[p]) {
+                if (part[b] != p || g.work[b] <= 0)
+                    continue;
+                for (const auto& l : g.links(b))
+                    ties[part[l.block]] += l.bytes;
+                for (const auto& l : g.links(b)) {
+                    const int q = part[l.block];
+                    if (q == p || !(loads.work[q] + g.work[b] < loads.work[p]))
+                        continue;
+                    const double gain = ties[q] - ties[p];
+                    if (best < 0 || gain > most)
+                        best = b, to = q, most = gain;
+                }
+                for (const auto& l : g.links(b))
+                    ties[part[l.block]] = 0;
+            }
+            if (best < 0)
+                continue;
+            loads.move(best, to);
+            moved = true;
+        }
+        if (!moved)
+            return;
+    }
+}
+
+/// Renames the parts so that most work stays where it was: greedy matching on the shared work.
+void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<int>& previous)
+{
+    struct Share {
+        int now, before;
+        double work;
+    };
+    std::vector<Share> shares;
+    for (int b = 0; b < g.size(); ++b)
+        if (previous[b] >= 0 && previous[b] < parts)
+            shares.push_back({part[b], previous[b], g.work[b]});
+    std::ranges::stable_sort(shares, {}, [](const Share& s) { return std::pair(s.now, s.before); });
+    std::size_t kept = 0;
+    for (const Share& s : shares) {
+        if (kept && shares[kept - 1].now == s.now && shares[kept - 1].before == s.before)
+            shares[kept - 1].work += s.work;
+        else
+            shares[kept++] = s;
+    }
+    shares.resize(kept);
+    std::ranges::stable_sort(shares, std::greater{}, &Share::work);
+    std::vector<int> label(parts, -1);
+    std::vector<char> taken(parts, 0);
+    for (const Share& s : shares)
+        if (label[s.now] < 0 && !taken[s.before])
+            label[s.now] = s.before, taken[s.before] = 1;
+    int next = 0;
+    for (int p = 0; p < parts; ++p) {
+        if (label[p] >= 0)
+            continue;
+        while (taken[next])
+            ++next;
+        label[p] = next, taken[next] = 1;
+    }
+    for (int& p : part)
+        p = label[p];
+}
+
+Cut best_cut(const BlockGraph& g, int parts, Method method)
+{
+    if (parts == 1)
+        return Cut(g.size(), 0);
+    Cut one_each(g.size());
+    std::iota(one_each.begin(), one_each.end(), 0);
+    if (parts == g.size())
+        return one_each;
+
+    Cut best = hilbert_cut(g, parts);
+    fill_empty_parts(g, best, parts);
+    if (method == Method::Hilbert)
+        return best;
+
+    constexpr double good = 1.03; // imbalance below which only the halo counts
+    even_out(g, best, parts, good);
+    CutReport report = describe(g, best, parts);
+    MetisGraph metis(g, parts);
+    const auto consider = [&](Way way) {
+        auto cut = metis_cut(metis, parts, way);
+        if (!cut)
+            return;
+        fill_empty_parts(g, *cut, parts);
+        even_out(g, *cut, parts, good);
+        const CutReport r = describe(g, *cut, parts);
+        if (std::pair(std::max(good, r.imbalance), r.cut_bytes) >=
+            std::pair(std::max(good, report.imbalance), report.cut_bytes))
+            return;
+        best = std::move(*cut);
+        report = r;
+    };
+    // Bisection cuts best in most scenes, and fastest; it complains on standard output where it runs out of
+    // blocks.
+    if (g.size() >= 3 * parts)
+        consider(Way::Bisection);
+    if (g.size() > small_graph)
+        return best;
+    if (metis.connected)
+        consider(Way::ContiguousKway);
+    consider(Way::Kway);
+    return best;
+}
+
+} // namespace
+
+std::vector<int> partition(const BlockGraph& g, int parts, Method method, const std::vector<int>* previous)
+{
+    ensure(parts >= 1, "a cut has at least one part");
+    ensure(!previous || int(previous->size()) == g.size(), "the previous cut has another number of blocks");
+    if (g.size() == 0)
+        return {};
+    Cut part = best_cut(g, std::min(parts, g.size()), method);
+    if (previous)
+        keep_labels(g, part, parts, *previous);
+    return part;
+}
+
+} // namespace kuzure

@@ -1,0 +1,42 @@
+#pragma once
+// Checkpoints: everything needed to go on bit for bit, on any number of ranks. Each is checked end to end
+// when it is read (a checksum over the rows of each table, the same for any number of ranks), and the one
+// before the last is kept.
+#include "io/file.hpp"
+#include "solver/core/particles.hpp"
+#include <optional>
+
+namespace kuzure::io
+{
+
+struct Checkpoint {
+    Path file;
+    std::int64_t particles = 0; // over all ranks
+    std::string scene_hash;     // of the scene that made it: the caller refuses another
+    std::string header;         // the caller's own text (time, step, counters ...)
+};
+
+/// Size of a checkpoint of that many particles.
+std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_particle);
+
+/// Collective. Writes every present field to directory/checkpoint.h5; the checkpoint before it becomes
+/// checkpoint.prev.h5. Until the new one is whole and on the disk, the old ones stay as they are. Throws
+/// IoFailed, naming the checkpoint that is still good. Gives the file's path.
+Path write_checkpoint(const Team&, const Path& directory, const Particles&, const std::string& scene_hash,
+                      const std::string& header);
+
+/// Collective. Replaces the particles: each rank gets a contiguous share of the rows as written, with the
+/// fields of the file. Refuses by IoFailed, on all ranks, what is damaged, cut short, of another format, or
+/// lacks a field that the particles already carry; they are then left empty.
+Checkpoint read_checkpoint(const Team&, const Path& file, Particles&);
+
+/// Collective. Reads the whole checkpoint without keeping it. Throws IoFailed as read_checkpoint does.
+Checkpoint verify_checkpoint(const Team&, const Path& file);
+
+/// Collective. The newest checkpoint of the directory that passes verify_checkpoint, or nothing if there is
+/// none at all. `say` gets, on rank 0, a sentence for each one passed over. Throws IoFailed if there are some
+/// and all are damaged.
+std::optional<Checkpoint> newest_good(const Team&, const Path& directory,
+                                      const std::function<void(const std::string&)>& say);
+
+} // namespace kuzure::io

@@ -1,0 +1,36 @@
+#pragma once
+// The scene file: TOML to a scene and back. What a scene may say stands in io/scene_keys.cpp alone.
+#include "solver/scene/check.hpp"
+#include "solver/scene/scene.hpp"
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace kuzure::io
+{
+
+/// The file's bytes. Throws BadInput if it cannot be read or is larger than 1 MiB.
+std::string read_scene_text(const std::filesystem::path&);
+
+/// A checked and resolved scene from the text of a scene file; `name` is what messages call the file, and
+/// every set is "key.path=value" and overrides the file. Throws BadInput with up to 20 lines `file:line: key:
+/// expected, found, remedy`.
+Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets = {},
+                  scene::StepLimit = scene::StepLimit::Enforce);
+
+/// parse_scene of read_scene_text. Throws BadInput.
+Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {},
+                 scene::StepLimit = scene::StepLimit::Enforce);
+
+/// The scene as TOML with every default written out; it reads back to the same scene bit for bit.
+std::string write_scene(const Scene&);
+
+/// 16 hexadecimal digits of all that changes the physics: everything but title, time.end, soil names and
+/// [output].
+std::string scene_hash(const Scene&);
+
+/// Every key with type, unit, default, range and meaning, as Markdown.
+std::string scene_reference();
+
+} // namespace kuzure::io

@@ -1,0 +1,58 @@
+#pragma once
+// Snapshots for ParaView: VTKHDF 1.0, an unstructured grid of vertices, one file a time, and the series that
+// gives the files their times.
+#include "io/file.hpp"
+#include "io/wall_points.hpp"
+#include "solver/core/particles.hpp"
+#include <optional>
+
+namespace kuzure::io
+{
+
+/// Names of the fields a snapshot can hold besides id, kind and soil, in the file's order.
+std::vector<std::string> snapshot_fields();
+
+struct SnapshotLabel {
+    double time = 0; // s
+    std::int64_t step = 0;
+    int dimensions = 3;
+    std::string title;
+    std::vector<std::string> fields; // of snapshot_fields(); empty: all
+};
+
+/// Size of a snapshot file of that many points (soil and wall).
+std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>& fields);
+
+/// Collective; every rank brings its soil and its walls, or none. Needs the velocity, stress, density and
+/// origin columns where those fields are asked for; a plastic strain nobody carries is written as zero.
+/// Throws BadInput for an unknown field, IoFailed.
+void write_snapshot(const Team&, const Path& file, const Particles&, const WallPoints&, const SnapshotLabel&);
+
+/// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series.
+class Snapshots
+{
+  public:
+    /// Collective; the directory exists. With a restart time the snapshots up to it stay and later ones are
+    /// removed; without, counting starts at 0.
+    Snapshots(const Team&, const Path& directory, std::optional<double> restart_time = {});
+
+    /// Collective. Writes the next snapshot and the series; gives the file's path. Throws IoFailed.
+    Path write(const Particles&, const WallPoints&, const SnapshotLabel&);
+    /// Time of the last snapshot in the directory, if there is one: a restart must not write it again.
+    std::optional<double> last_time() const;
+    int count() const { return next_; }
+
+  private:
+    struct Entry {
+        std::string name;
+        double time;
+    };
+    void write_series() const;
+
+    const Team& team_;
+    Path directory_;
+    std::vector<Entry> entries_;
+    int next_ = 0;
+};
+
+} // namespace kuzure::io

@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# Install what kuzure needs (Debian 12 or later, Ubuntu 24.04 or later): as root, or with a sudo that asks no password.
+#   jobs/install.sh          to build and run
+#   jobs/install.sh tests    also what only the test suite needs
+# Does nothing, and needs no network, where everything is there.
+set -euo pipefail
+
+build=(g++ cmake ninja-build ccache git make pkg-config)
+libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlplusplus-dev libcli11-dev libfmt-dev
+    libpng-dev nlohmann-json3-dev libgtest-dev libgmock-dev libbenchmark-dev)
+scripts=(python3 python3-h5py python3-numpy)
+command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
+tests=(clang-format valgrind binutils)
+
+packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
+case "${1-}" in
+"") ;;
+tests) packages+=("${tests[@]}") ;;
+*)
+    echo "usage: jobs/install.sh [tests]" >&2
+    exit 2
+    ;;
+esac
+
+fail() {
+    printf 'jobs/install.sh: %s\n' "$@" >&2
+    exit 1
+}
+
+if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+    missing=()
+    for tool in g++ cmake ninja mpirun; do
+        command -v "$tool" >/dev/null || missing+=("$tool")
+    done
+    /usr/bin/python3 -c 'import h5py, numpy' 2>/dev/null || missing+=("python3-h5py+numpy")
+    [ ${#missing[@]} = 0 ] && exit 0 # the libraries are CMake's to find and to name
+    fail "this is not a Debian or Ubuntu system, so the packages have to be installed by hand." \
+        "missing here: ${missing[*]}" \
+        "needed: a C++20 compiler (g++ 11 to 14), cmake 3.22+, ninja, git, make; an MPI; METIS 5; parallel HDF5 1.10+;" \
+        "  toml++ 3.3+, CLI11 2, fmt 8+, libpng, nlohmann-json 3; GoogleTest 1.12+, Google Benchmark; python3 with h5py and" \
+        "  numpy; gnuplot; for the tests clang-format 14, valgrind and binutils." \
+        "Fedora: dnf install gcc-c++ cmake ninja-build ccache git make openmpi-devel metis-devel hdf5-openmpi-devel tomlplusplus-devel" \
+        "  cli11-devel fmt-devel libpng-devel json-devel gtest-devel gmock-devel google-benchmark-devel python3-h5py gnuplot" \
+        "Debian names: ${packages[*]}"
+fi
+
+# Exit status 1 only says that dpkg has never heard of some of them: those are not in its answer.
+installed=" $(dpkg-query -W -f '${db:Status-Abbrev}${Package} ' "${packages[@]}" 2>/dev/null || true)"
+missing=()
+for package in "${packages[@]}"; do
+    [[ $installed == *" ii $package "* || $installed == *" hi $package "* ]] || missing+=("$package")
+done
+[ ${#missing[@]} = 0 ] && exit 0
+
+as_root=()
+if [ "$(id -u)" != 0 ]; then
+    by_hand="run: sudo apt-get update && sudo apt-get install --no-install-recommends ${missing[*]}"
+    command -v sudo >/dev/null || fail "packages are missing, and this is neither root nor is there a sudo." \
+        "As root, ${by_hand//sudo /}"
+    sudo -n true 2>/dev/null || fail "packages are missing, and sudo wants a password here." "Once, $by_hand"
+    as_root=(sudo -n)
+fi
+
+log=$(mktemp "${TMPDIR:-/tmp}/kuzure-install.XXXXXX")
+started=$SECONDS
+apt() { # an apt-get that waits for other installers, asks nothing, and keeps its talk to the log
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive NEEDRESTART_MODE=a apt-get -q -y -o DPkg::Lock::Timeout=600 \
+        -o Acquire::Retries=3 "$@" >>"$log" 2>&1 </dev/null
+}
+echo "installing ${#missing[@]} packages (a minute or less): ${missing[*]}"
+updated=yes
+apt update || updated=no
+if ! apt install --no-install-recommends "${missing[@]}"; then
+    tail -n 15 "$log" >&2
+    if [ $updated = no ]; then
+        fail "the package lists could not be fetched: is there a network, or a proxy to set in /etc/apt/apt.conf?" \
+            "The whole log: $log"
+    fi
+    fail "apt-get could not install: ${missing[*]}" "Debian before 12 and Ubuntu before 24.04 do not have them all." \
+        "If a package was interrupted before, run: dpkg --configure -a. The whole log: $log"
+fi
+rm -f "$log"
+echo "installed in $((SECONDS - started)) s"

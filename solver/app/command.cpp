@@ -1,0 +1,46 @@
+#include "solver/app/command.hpp"
+#include "io/file.hpp"
+#include "solver/core/simd.hpp"
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <fmt/format.h>
+#include <omp.h>
+#include <sched.h>
+
+namespace kuzure {
+
+void SceneArguments::add_to(CLI::App& app)
+{
+    app.add_option("SCENE.toml", file, "the scene")->required();
+    app.add_option("--set", sets, "key.path=value: override a key of the scene")->type_name("KEY=VALUE")->allow_extra_args(false);
+    app.add_flag("--force-step", force_step, "accept a fixed step above the stable limit");
+}
+
+Scene SceneArguments::read(const Comm& comm) const
+{
+    std::string text;
+    io::on_root(comm, [&] { text = io::read_scene_text(file); });
+    text = comm.broadcast(text);
+    return io::parse_scene(text, file, sets, force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce);
+}
+
+std::string version() { return KUZURE_VERSION; }
+
+std::string version_text()
+{
+    return fmt::format("kuzure {} ({}), GCC {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, __VERSION__, instruction_set(), _OPENMP);
+}
+
+int use_threads(const Comm& comm, int threads)
+{
+    if (threads <= 0) {
+        cpu_set_t cpus;
+        const int cores = sched_getaffinity(0, sizeof cpus, &cpus) == 0 ? CPU_COUNT(&cpus) : omp_get_num_procs();
+        const char* asked = std::getenv("OMP_NUM_THREADS");
+        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores / comm.node_place().size);
+    }
+    omp_set_num_threads(threads);
+    return threads;
+}
+
+} // namespace kuzure

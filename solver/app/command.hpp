@@ -1,0 +1,40 @@
+#pragma once
+// What the commands share: the team, the scene given on the command line, and how they are registered.
+#include "decomposition/comm.hpp"
+#include "io/scene_file.hpp"
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace kuzure {
+
+/// Exit codes of the program.
+enum class Exit : int { Ok = 0, BadInput = 2, NumbersFailed = 3, IoFailed = 4, Stopped = 5 };
+
+/// SCENE.toml and --set of the commands that read a scene.
+struct SceneArguments {
+    std::string file;
+    std::vector<std::string> sets;
+    bool force_step = false;
+    void add_to(CLI::App&);
+    /// Collective: rank 0 reads the file, every rank parses. Throws BadInput on all ranks.
+    Scene read(const Comm&) const;
+};
+
+/// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
+using Action = std::function<Exit(const Comm&)>;
+void add_run(CLI::App&, Action& chosen);
+void add_check(CLI::App&, Action& chosen);
+
+/// "0.1.0", and a text with git hash, compiler, instruction set and packages.
+std::string version();
+std::string version_text();
+
+/// Use this many threads (0: the cores of this node shared evenly by its ranks); gives the number. Collective.
+int use_threads(const Comm&, int threads);
+
+} // namespace kuzure

@@ -1,0 +1,393 @@
+// kuzure run: the run loop, and everything a run leaves in its directory.
+#include "io/checkpoint.hpp"
+#include "io/history.hpp"
+#include "io/picture.hpp"
+#include "io/result_directory.hpp"
+#include "io/snapshot.hpp"
+#include "io/summary.hpp"
+#include "perf/report.hpp"
+#include "solver/app/command.hpp"
+#include "solver/app/measure.hpp"
+#include "solver/app/simulation.hpp"
+#include "solver/core/simd.hpp"
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <csignal>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+namespace kuzure {
+
+namespace {
+
+struct Arguments {
+    SceneArguments scene;
+    std::string output;
+    std::optional<std::string> restart; // empty: the newest good checkpoint
+    int threads = 0;
+    double max_minutes = 0;
+    bool force = false, quiet = false, plain = false;
+    int recut_every = 0;
+};
+
+volatile std::sig_atomic_t asked_to_stop = 0;
+void on_signal(int) { asked_to_stop = 1; }
+
+double now()
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string header_text(const Simulation& sim)
+{
+    const Clock c = sim.clock();
+    const auto& e = c.extremes;
+    const auto& d = c.dissipated;
+    return nlohmann::ordered_json{{"time", c.time},
+                                  {"step", c.step},
+                                  {"dt", c.dt},
+                                  {"extremes", {e.acceleration2, e.signal, e.moved2, e.speed2}},
+                                  {"pairs", c.pairs},
+                                  {"dissipated", {d.plastic, d.viscous, d.wall, d.damping}},
+                                  {"energy_at_start", c.energy_at_start},
+                                  {"energy_unit", c.energy_unit},
+                                  {"model", sim.model().name()},
+                                  {"instruction_set", instruction_set()},
+                                  {"version", version()}}
+        .dump();
+}
+
+Clock clock_from(const std::string& header, const io::Path& file)
+{
+    try {
+        const auto j = nlohmann::json::parse(header);
+        Clock c;
+        c.time = j.at("time"), c.step = j.at("step"), c.dt = j.at("dt"), c.pairs = j.at("pairs");
+        const auto& e = j.at("extremes");
+        c.extremes.acceleration2 = e.at(0), c.extremes.signal = e.at(1), c.extremes.moved2 = e.at(2), c.extremes.speed2 = e.at(3);
+        const auto& d = j.at("dissipated");
+        c.dissipated = {d.at(0), d.at(1), d.at(2), d.at(3)};
+        c.energy_at_start = j.at("energy_at_start"), c.energy_unit = j.at("energy_unit");
+        return c;
+    } catch (const nlohmann::json::exception& e) {
+        throw IoFailed(fmt::format("{}: the clock of this checkpoint cannot be read ({})", file.string(), e.what()));
+    }
+}
+
+/// This rank's even share of all wall particles, for snapshots and pictures.
+io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::vector<Material>& soils)
+{
+    io::WallPoints w;
+    const std::int64_t n = f.wall_count(), first = f.soil_count();
+    const std::int64_t begin = n * comm.rank() / comm.size(), end = n * (comm.rank() + 1) / comm.size();
+    for (std::int64_t k = begin; k < end; ++k) {
+        w.position.push_back(f.wall_position(first + k));
+        w.id.push_back(first + k);
+        w.density.push_back(soils.front().density);
+    }
+    return w;
+}
+
+/// One line on the terminal, or plain lines at intervals in a log.
+class Progress {
+public:
+    Progress(bool speaks, double end) : speaks_(speaks), bar_(isatty(1) != 0), end_(end), start_(now()), last_(start_) {}
+    void show(const Simulation& sim, double residual, bool final = false)
+    {
+        if (!speaks_) return;
+        const double t = now();
+        if (!final && t - last_ < (bar_ ? 0.5 : 10.0)) return;
+        const double rate = (sim.steps() - first_step_) / std::max(t - start_, 1e-9);
+        const double done = std::min(sim.time() / end_, 1.0);
+        const double left = sim.time() > first_time_ ? (t - start_) * (end_ - sim.time()) / (sim.time() - first_time_) : 0;
+        std::string line = fmt::format("t {:.4f} of {:g} s  step {}  dt {:.2e}  {:.1f} steps/s  max {:.2f} m/s  residual {:+.2e}  {:.0f} s left",
+                                       sim.time(), end_, sim.steps(), sim.dt(), rate, sim.max_speed(), residual, left);
+        if (sim.comm().size() > 1) line += fmt::format("  imbalance {:.2f}", sim.structure().imbalance);
+        if (bar_) {
+            const int width = 20, full = int(done * width);
+            fmt::print("\r[{}{}] {}\x1b[K{}", std::string(full, '#'), std::string(width - full, '.'), line, final ? "\n" : "");
+        } else fmt::print("{:3.0f} %  {}\n", 100 * done, line);
+        std::fflush(stdout);
+        last_ = t;
+    }
+    void from(const Simulation& sim) { first_step_ = sim.steps(), first_time_ = sim.time(); }
+
+private:
+    bool speaks_, bar_;
+    double end_, start_, last_;
+    std::int64_t first_step_ = 0;
+    double first_time_ = 0;
+};
+
+class Run {
+public:
+    Run(const Comm& comm, const Arguments& a)
+        : comm_(comm), args_(a), start_(now()), threads_(use_threads(comm, a.threads)), scene_(a.scene.read(comm)),
+          hash_(io::scene_hash(scene_)), speaks_(comm.rank() == 0 && !a.quiet)
+    {
+    }
+
+    Exit go()
+    {
+        open();
+        const Exit code = loop();
+        return code;
+    }
+
+private:
+    void say(const std::string& text) const
+    {
+        if (speaks_) fmt::print("{}\n", text), std::fflush(stdout);
+    }
+
+    void open()
+    {
+        io::Path where = args_.output;
+        if (where.empty()) where = scene_.output.directory;
+        if (where.empty()) where = io::Path("results") / io::Path(args_.scene.file).stem();
+        std::optional<io::Checkpoint> from;
+        if (args_.restart) {
+            if (!args_.restart->empty()) from = io::verify_checkpoint(comm_, *args_.restart);
+            else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
+            if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
+        }
+        if (from && from->scene_hash != hash_)
+            throw BadInput(fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
+                                       "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
+                                       from->file.string(), from->scene_hash, hash_));
+        const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every, 50};
+        std::optional<double> restart_time;
+        if (from) {
+            Particles p;
+            io::read_checkpoint(comm_, from->file, p);
+            const Clock clock = clock_from(from->header, from->file);
+            restart_time = clock.time;
+            dir_.emplace(comm_, where, io::Existing::GoOn);
+            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, options);
+            say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
+        } else {
+            dir_.emplace(comm_, where, args_.force || args_.restart ? io::Existing::MoveAside : io::Existing::Refuse);
+            if (!dir_->moved_to().empty()) say(fmt::format("the old results are now in {}", dir_->moved_to().string()));
+            sim_ = std::make_unique<Simulation>(comm_, scene_, options);
+        }
+        io::on_root(comm_, [&] {
+            char host[256] = "";
+            gethostname(host, sizeof host - 1);
+            io::write_atomically(dir_->scene(), fmt::format("# {}\n# host {}, {} ranks x {} threads, scene hash {}, pair model {}\n{}", version_text(),
+                                                            host, comm_.size(), threads_, hash_, sim_->model().name(), io::write_scene(scene_)));
+            std::filesystem::create_directories(dir_->snapshots());
+            std::filesystem::remove(dir_->stop());
+        });
+        walls_ = wall_share(comm_, sim_->filling(), {sim_->soils().begin(), sim_->soils().end()});
+        snapshots_.emplace(comm_, dir_->snapshots(), restart_time);
+        history_.emplace(comm_, dir_->history(), scene_.dimensions, restart_time);
+        say(fmt::format("{}: {} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title, sim_->filling().soil_count(),
+                        sim_->filling().wall_count(), comm_.size(), threads_, sim_->model().name()));
+    }
+
+    /// True if something that comes every `interval` s is due at this step and was not there at the one before.
+    static bool due(std::optional<double> interval, double time, double before)
+    {
+        if (!interval) return false;
+        const auto count = [&](double t) { return std::floor(t / *interval * (1 + 1e-12) + 1e-9); };
+        return before < 0 || count(time) > count(before);
+    }
+
+    void outputs(double before, bool last)
+    {
+        Simulation& sim = *sim_;
+        const double t = sim.time();
+        if (due(scene_.output.history, t, before) || last) {
+            if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(); });
+        }
+        if (due(scene_.output.every, t, before) || last || before < 0) {
+            if (!snapshots_->last_time() || t > *snapshots_->last_time()) {
+                sim.timers().timed(Phase::Snapshot, [&] {
+                    snapshots_->write(sim.particles(), walls_, {t, sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
+                });
+                if (scene_.output.picture) sim.timers().timed(Phase::Picture, [&] { write_picture(snapshots_->count() - 1); });
+            }
+        }
+    }
+
+    void write_history()
+    {
+        const Ledger l = sim_->ledger();
+        const Heap heap = measure_heap(comm_, sim_->particles(), scene_, sim_->filling());
+        residual_ = sim_->residual(l);
+        history_->append({sim_->time(), sim_->steps(), sim_->dt(), l.state.kinetic, l.state.potential, l.state.elastic, l.dissipated.plastic,
+                          l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, residual_, sim_->max_speed(), heap.height, heap.min_x,
+                          heap.max_x, heap.min_y, heap.max_y});
+    }
+
+    void write_picture(int number)
+    {
+        const auto extent = io::soil_extent(comm_, sim_->particles());
+        io::PictureLabel label;
+        label.look = *scene_.output.picture;
+        label.dimensions = scene_.dimensions;
+        label.low = extent.low, label.high = extent.high;
+        label.spacing = scene_.space.spacing;
+        label.title = scene_.title;
+        label.time = sim_->time();
+        io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
+    }
+
+    void write_checkpoint()
+    {
+        sim_->timers().timed(Phase::Checkpoint, [&] {
+            history_->sync();
+            checkpoint_ = io::write_checkpoint(comm_, dir_->path(), sim_->particles(), hash_, header_text(*sim_));
+        });
+        last_checkpoint_ = now();
+    }
+
+    void write_summary(const std::string& status, Exit code, const std::string& message = {})
+    {
+        const Ledger l = sim_->ledger();
+        const double seconds = now() - start_;
+        const WorkDone work = sim_->work_done();
+        const std::int64_t steps_here = sim_->steps() - first_step_;
+        const double stepping = loop_seconds_;
+        io::Summary s;
+        s.status = status, s.exit_code = int(code), s.scene_hash = hash_, s.version = version_text();
+        s.ranks = comm_.size(), s.threads = threads_;
+        s.precision = sim_->model().precision() == scene::Precision::Mixed ? "mixed" : "double";
+        s.soil_particles = sim_->filling().soil_count(), s.wall_particles = sim_->filling().wall_count();
+        s.steps = sim_->steps(), s.time = sim_->time(), s.wall_seconds = seconds, s.pairs = sim_->pairs();
+        s.seconds_per_step = steps_here > 0 ? stepping / double(steps_here) : 0;
+        const std::int64_t particle_steps = comm_.sum(work.particle_steps);
+        s.particle_steps_per_second = stepping > 0 ? double(particle_steps) / stepping : 0;
+        s.energy = {{"kinetic", l.state.kinetic},        {"potential", l.state.potential}, {"elastic", l.state.elastic},
+                    {"plastic", l.dissipated.plastic},   {"viscous", l.dissipated.viscous}, {"wall", l.dissipated.wall},
+                    {"damping", l.dissipated.damping},   {"residual", sim_->residual(l)}};
+        s.effects = scene_.notes;
+        s.state_hash = state_hash(comm_, sim_->particles());
+        s.message = message;
+        const std::int64_t memory = comm_.max(std::int64_t(sim_->memory_bytes()));
+        auto j = io::to_json(s);
+        j["memory_bytes_per_rank"] = memory;
+        j["rebuilds"] = sim_->structure().rebuilds;
+        j["repartitions"] = sim_->structure().cuts;
+        j["pair_model"] = sim_->model().name();
+        io::write_json(comm_, dir_->summary(), j);
+
+        auto report = phase_report(sim_->timers(), work, threads_, comm_);
+        io::on_root(comm_, [&] {
+            io::write_atomically(dir_->path() / "timers.json", report.json());
+            io::write_atomically(dir_->path() / "timers.txt", report.text());
+        });
+    }
+
+    Wishes wishes()
+    {
+        Wishes w;
+        const double t = now();
+        w.stop = asked_to_stop != 0 || (args_.max_minutes > 0 && t - start_ > 60 * args_.max_minutes);
+        if (comm_.rank() == 0) {
+            if (t - last_look_ > 1) {
+                last_look_ = t;
+                std::error_code ignored;
+                stop_file_ = std::filesystem::exists(dir_->stop(), ignored);
+            }
+            w.stop = w.stop || stop_file_;
+            w.checkpoint = t - last_checkpoint_ > 60 * scene_.output.checkpoint_minutes;
+        }
+        return w;
+    }
+
+    Exit loop()
+    {
+        std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
+        Simulation& sim = *sim_;
+        Progress progress(speaks_, scene_.time.end);
+        progress.from(sim);
+        first_step_ = sim.steps();
+        last_checkpoint_ = now();
+        const double begin = now();
+        try {
+            outputs(sim.steps() == 0 ? -1 : sim.time(), sim.finished());
+            while (!sim.finished()) {
+                const double before = sim.time();
+                const Wishes w = sim.step(wishes());
+                loop_seconds_ = now() - begin;
+                outputs(before, sim.finished());
+                progress.show(sim, residual_);
+                if (w.stop && !sim.finished()) {
+                    write_checkpoint();
+                    write_summary("stopped", Exit::Stopped);
+                    progress.show(sim, residual_, true);
+                    say(fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim.time(), sim.steps(),
+                                    checkpoint_.string()));
+                    return Exit::Stopped;
+                }
+                if (w.checkpoint) write_checkpoint();
+            }
+            write_checkpoint();
+        } catch (const NumbersFailed& e) {
+            loop_seconds_ = now() - begin;
+            std::string text = e.what();
+            try {
+                snapshots_->write(sim.particles(), walls_, {sim.time(), sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
+                text += fmt::format(". The moment is in the last snapshot of {}", dir_->snapshots().string());
+                text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
+                write_summary("numbers failed", Exit::NumbersFailed, text);
+            } catch (const IoFailed& io) {
+                text += fmt::format(". It could not be saved: {}", io.what());
+            }
+            throw NumbersFailed(text);
+        } catch (const IoFailed& e) {
+            throw IoFailed(std::string(e.what()) +
+                           (checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string()));
+        }
+        write_summary("finished", Exit::Ok);
+        progress.show(sim, residual_, true);
+        say(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {:+.2e}; results in {}", sim.steps() - first_step_, now() - start_,
+                        1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)), residual_, dir_->path().string()));
+        return Exit::Ok;
+    }
+
+    const Comm& comm_;
+    Arguments args_;
+    double start_;
+    int threads_;
+    Scene scene_;
+    std::string hash_;
+    bool speaks_;
+    std::optional<io::ResultDirectory> dir_;
+    std::unique_ptr<Simulation> sim_;
+    io::WallPoints walls_;
+    std::optional<io::Snapshots> snapshots_;
+    std::optional<io::History> history_;
+    io::Path checkpoint_;
+    double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, residual_ = 0;
+    bool stop_file_ = false;
+    std::int64_t first_step_ = 0;
+};
+
+} // namespace
+
+void add_run(CLI::App& app, Action& chosen)
+{
+    auto* command = app.add_subcommand("run", "simulate a scene");
+    auto a = std::make_shared<Arguments>();
+    a->scene.add_to(*command);
+    command->add_option("-o,--output", a->output, "result directory (default: [output] directory, or results/<scene>)")->type_name("DIR");
+    auto* restart = command->add_option("--restart", a->restart, "go on from the newest good checkpoint of the directory, or from FILE")
+                        ->type_name("FILE")
+                        ->expected(0, 1)
+                        ->default_str("");
+    command->add_option("--threads", a->threads, "threads of each rank (default: the node's cores shared by its ranks)")->check(CLI::Range(1, 4096));
+    command->add_option("--max-minutes", a->max_minutes, "stop with a checkpoint and exit code 5 after so many minutes")->check(CLI::PositiveNumber);
+    command->add_flag("--quiet", a->quiet, "print nothing but errors");
+    command->add_flag("--force", a->force, "move an existing result directory aside");
+    command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");
+    command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
+    command->callback([=, &chosen] {
+        if (restart->count() > 0 && !a->restart) a->restart = "";
+        chosen = [=](const Comm& comm) { return Run(comm, *a).go(); };
+    });
+}
+
+} // namespace kuzure

@@ -1,0 +1,44 @@
+#pragma once
+// Stress "at rest": the weight of the soil above a point, and K0 times it sideways.
+#include "solver/scene/fill.hpp"
+#include "solver/scene/material.hpp"
+
+namespace kuzure {
+
+class InitialStress {
+public:
+    InitialStress(const Scene& s, const scene::Filling& f, std::span<const Material> soils) : scene_(s), filling_(f), soils_(soils)
+    {
+        gravity_ = s.effects.gravity ? -s.effects.gravity->z : 0;
+    }
+
+    /// Stress at a soil particle's initial position. Vertical: the column one spacing wide above it. Sideways: elastic
+    /// K0 = nu/(1 - nu), or, where that lies outside the cone, the K0 that lies on it.
+    Stress operator()(Vector x, int soil) const
+    {
+        const double dx = scene_.space.spacing, half = 0.499999 * dx, top = filling_.soil_bounds().high.z;
+        double load = 0; // Pa
+        filling_.for_each_soil_in({{x.x - half, x.y - half, x.z - half}, {x.x + half, x.y + half, top + half}},
+                                  [&](std::int64_t, Vector above, int body) {
+                                      const double part = above.z < x.z + 0.25 * dx ? 0.5 : 1.0;
+                                      load += part * soils_[scene_.bodies[body].soil].density * gravity_ * dx;
+                                  });
+        if (load <= 0) return {};
+        const Material& m = soils_[soil];
+        // K0 from K and G: nu/(1 - nu) = (3 K - 2 G)/(3 K + 4 G)
+        const double elastic = (3 * m.bulk - 2 * m.shear) / (3 * m.bulk + 4 * m.shear);
+        // on the cone: (1 - K)/sqrt3 = alpha (1 + 2 K) + k/load
+        const double root3 = std::sqrt(3.0);
+        const double yielding = (1 - root3 * (m.alpha + m.k / load)) / (1 + 2 * root3 * m.alpha);
+        const double sideways = -load * std::max(elastic, yielding);
+        return {sideways, sideways, -load, 0, 0, 0};
+    }
+
+private:
+    const Scene& scene_;
+    const scene::Filling& filling_;
+    std::span<const Material> soils_;
+    double gravity_;
+};
+
+} // namespace kuzure

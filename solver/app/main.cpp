@@ -1,0 +1,48 @@
+// Arguments, MPI on and off, exit codes. What a command does stands in solver/app/commands.
+#include "solver/app/command.hpp"
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+using namespace kuzure;
+
+int main(int argc, char** argv)
+{
+    CLI::App app{"kuzure: soil that collapses under its own weight"};
+    app.set_version_flag("--version", version_text());
+    app.require_subcommand(1);
+    Action chosen;
+    add_run(app, chosen);
+    add_check(app, chosen);
+    Environment mpi(argc, argv);
+    const Comm& comm = Comm::world();
+    const bool speaks = comm.rank() == 0;
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        if (e.get_exit_code() == 0) {
+            if (speaks) app.exit(e);
+            return 0;
+        }
+        if (speaks) std::fprintf(stderr, "kuzure: %s\nsee kuzure --help\n", e.what());
+        return int(Exit::BadInput);
+    }
+    const auto fail = [&](const char* what, Exit code) {
+        if (speaks) std::fprintf(stderr, "kuzure: %s\n", what);
+        return int(code);
+    };
+    try {
+        return int(chosen(comm));
+    } catch (const BadInput& e) {
+        return fail(e.what(), Exit::BadInput);
+    } catch (const NumbersFailed& e) {
+        return fail(e.what(), Exit::NumbersFailed);
+    } catch (const IoFailed& e) {
+        return fail(e.what(), Exit::IoFailed);
+    } catch (const std::bad_alloc&) {
+        std::fprintf(stderr, "kuzure: rank %d has no more memory. Remedy: more ranks on more nodes, a larger spacing\n", comm.rank());
+        comm.abort(int(Exit::IoFailed));
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "kuzure: rank %d: %s (a defect of kuzure: please report it)\n", comm.rank(), e.what());
+        comm.abort(70);
+    }
+}

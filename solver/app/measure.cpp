@@ -1,0 +1,66 @@
+#include "solver/app/measure.hpp"
+#include <algorithm>
+#include <limits>
+#include <unordered_map>
+
+namespace kuzure {
+
+namespace {
+struct Column {
+    std::int32_t x, y;
+    std::int32_t count;
+    double top; // m, highest particle centre
+};
+} // namespace
+
+Heap measure_heap(const Team& team, const Particles& p, const Scene& s, const scene::Filling& filling)
+{
+    const double dx = s.space.spacing;
+    const auto& start = filling.soil_bounds();
+    const Vector corner{start.low.x - 0.5 * dx, s.dimensions == 3 ? start.low.y - 0.5 * dx : 0, start.low.z - 0.5 * dx};
+    const auto x = p[field::position];
+
+    std::unordered_map<std::int64_t, Column> mine;
+    mine.reserve(std::size_t(p.size()) / 4 + 16);
+    for (Index i = 0; i < p.size(); ++i) {
+        const Vector a = x[i];
+        const auto cx = std::int32_t(std::floor((a.x - corner.x) / dx));
+        const auto cy = s.dimensions == 3 ? std::int32_t(std::floor((a.y - corner.y) / dx)) : 0;
+        auto& c = mine.try_emplace(std::int64_t(cx) << 32 | std::uint32_t(cy), Column{cx, cy, 0, a.z}).first->second;
+        ++c.count;
+        c.top = std::max(c.top, a.z);
+    }
+    std::vector<Column> columns;
+    columns.reserve(mine.size());
+    for (const auto& [key, c] : mine) columns.push_back(c);
+    if (team.size() > 1) {
+        // Columns that several ranks share are put together on the root.
+        const auto parts = team.gather(std::as_bytes(std::span(columns)));
+        std::unordered_map<std::int64_t, Column> all;
+        for (const auto& part : parts)
+            for (std::size_t k = 0; k + sizeof(Column) <= part.size(); k += sizeof(Column)) {
+                Column c;
+                std::memcpy(&c, part.data() + k, sizeof c);
+                auto& to = all.try_emplace(std::int64_t(c.x) << 32 | std::uint32_t(c.y), Column{c.x, c.y, 0, c.top}).first->second;
+                to.count += c.count;
+                to.top = std::max(to.top, c.top);
+            }
+        columns.clear();
+        for (const auto& [key, c] : all) columns.push_back(c);
+    }
+    // A column of n particles stands n spacings high: volume spacing^3 each over spacing^2.
+    const double grain = s.output.grain.value_or(dx);
+    double e[5] = {-1e300, -1e300, -1e300, -1e300, -1e300}; // top, -min_x, max_x, -min_y, max_y
+    for (const Column& c : columns) {
+        if (c.count * dx < grain * (1 - 1e-9)) continue;
+        e[0] = std::max(e[0], c.top + 0.5 * dx - corner.z);
+        e[1] = std::max(e[1], -(corner.x + c.x * dx)), e[2] = std::max(e[2], corner.x + (c.x + 1) * dx);
+        e[3] = std::max(e[3], -(corner.y + c.y * dx)), e[4] = std::max(e[4], corner.y + (c.y + 1) * dx);
+    }
+    team.max(std::span<double>(e));
+    if (e[0] < -1e299) return {};
+    if (s.dimensions == 2) e[3] = e[4] = 0;
+    return {e[0], -e[1], e[2], -e[3], e[4]};
+}
+
+} // namespace kuzure

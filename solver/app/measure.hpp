@@ -1,0 +1,18 @@
+#pragma once
+// What a user measures on a heap: how high it stands and how far it reaches.
+#include "solver/core/particles.hpp"
+#include "solver/core/team.hpp"
+#include "solver/scene/fill.hpp"
+
+namespace kuzure {
+
+/// Height and reach of the columns, one spacing wide, whose soil stands at least `grain` high (its volume over its
+/// area); outer edges of those columns, m. All zero where no column does.
+struct Heap {
+    double height = 0;
+    double min_x = 0, max_x = 0, min_y = 0, max_y = 0;
+};
+/// Collective; heights count from the lowest soil at the start.
+Heap measure_heap(const Team&, const Particles&, const Scene&, const scene::Filling&);
+
+} // namespace kuzure

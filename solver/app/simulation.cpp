@@ -1,0 +1,591 @@
+#include "solver/app/simulation.hpp"
+#include "solver/app/initial_stress.hpp"
+#include <fmt/format.h>
+#include <limits>
+#include <map>
+#include <omp.h>
+
+namespace kuzure {
+
+namespace {
+
+/// Edge of the blocks: about `per_rank` blocks of soil a rank, whole numbers of them on periodic axes.
+Vector block_size(const Scene& s, const scene::Filling& f, int ranks, int per_rank)
+{
+    const double dx = s.space.spacing;
+    const double particles = double(f.soil_count()) / (double(ranks) * per_rank);
+    double edge = std::max(3.0, s.dimensions == 3 ? std::cbrt(particles) : std::sqrt(particles)) * dx;
+    if (ranks == 1) edge = 1e3 * edge;
+    Vector size{edge, edge, edge};
+    const auto fit = [&](int axis, double lo, double hi, double& e) {
+        if (s.space.periodic[axis]) e = (hi - lo) / std::max(1.0, std::floor((hi - lo) / e));
+    };
+    if (s.space.low) {
+        fit(0, s.space.low->x, s.space.high->x, size.x);
+        fit(1, s.space.low->y, s.space.high->y, size.y);
+        fit(2, s.space.low->z, s.space.high->z, size.z);
+    }
+    return size;
+}
+Vector low_corner(const scene::Filling& f, const Scene& s)
+{
+    const double half = 0.5 * s.space.spacing;
+    const auto& b = f.soil_bounds();
+    return {b.low.x - half, s.dimensions == 3 ? b.low.y - half : -half, b.low.z - half};
+}
+Vector domain_origin(const scene::Filling& f, const Scene& s)
+{
+    Vector o = low_corner(f, s);
+    if (s.space.periodic[0]) o.x = s.space.low->x;
+    if (s.space.periodic[1]) o.y = s.space.low->y;
+    if (s.space.periodic[2]) o.z = s.space.low->z;
+    return o;
+}
+Vector period(const Scene& s)
+{
+    return s.space.low && s.space.high ? *s.space.high - *s.space.low : Vector{1, 1, 1};
+}
+
+template <class T> Record<T> far_away()
+{
+    Record<T> r{};
+    if constexpr (std::is_same_v<T, double>) r.x = r.y = r.z = 1e12;
+    else r.x = r.y = r.z = 1 << 30;
+    r.density = T(1000), r.sound_speed = T(1);
+    return r;
+}
+
+} // namespace
+
+Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
+    : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
+      columns_(Columns::of(scene, low_corner(filling_, scene))),
+      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank),
+              scene.space.periodic, scene.space.low.value_or(Vector{}), period(scene)),
+      buffers_(Buffers<double>(scene.smoothing_length()))
+{
+    timers_.timed(Phase::Setup, [&] {
+        prepare();
+        cut_by_counts();
+        fill();
+        const double unit = clock_.energy_unit * 65536;
+        const auto e = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, unit);
+        clock_.energy_at_start = e.kinetic + e.potential + e.elastic;
+        clock_.extremes.acceleration2 = dot(forces_.gravity, forces_.gravity);
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+        double fastest = 0;
+        for (const auto& b : scene_.bodies) fastest = std::max(fastest, dot(b.velocity, b.velocity));
+        clock_.extremes.speed2 = fastest;
+    });
+}
+
+Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
+    : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
+      columns_(Columns::of(scene, low_corner(filling_, scene))),
+      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank),
+              scene.space.periodic, scene.space.low.value_or(Vector{}), period(scene)),
+      particles_(std::move(particles)), buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
+{
+    timers_.timed(Phase::Setup, [&] {
+        prepare();
+        if (comm_.rank() != 0) clock_.pairs = 0, clock_.dissipated = {};
+        std::map<Block, double> count;
+        for (Index i = 0; i < particles_.size(); ++i) count[domain_.block_of(particles_[field::position][i])] += 1;
+        std::vector<BlockWork> work;
+        for (const auto& [b, n] : count) work.push_back({b, n, n});
+        domain_.cut(work, Method::Metis, {reach_, double(row_bytes())});
+        domain_.migrate(particles_);
+        if (clock_.step > 0) rebuild(false);
+    });
+}
+
+Simulation::~Simulation() = default;
+
+void Simulation::prepare()
+{
+    const bool mixed = model_->precision() == scene::Precision::Mixed;
+    if (mixed) buffers_ = Buffers<float>(scene_.smoothing_length());
+    for (const auto& s : scene_.soils) soils_.push_back(Material::from(s));
+    reach_ = scene_.support() * (1 + scene_.accuracy.skin);
+    skin_ = scene_.support() * scene_.accuracy.skin;
+    forces_.gravity = scene_.effects.gravity.value_or(Vector{});
+    particles_.require(field::position, field::velocity, field::half_velocity, field::density, field::half_density, field::stress,
+                       field::half_stress, field::plastic_strain, field::sorted_position, field::origin, field::id, field::soil);
+    // Denormals are flushed in every thread, whatever ran before.
+#pragma omp parallel
+    flush_denormals();
+
+    if (clock_.energy_unit == 0) {
+        // A yardstick for the energy of the whole run: weight times height, or kinetic energy, or a little strain.
+        const auto& b = filling_.soil_bounds();
+        double scale = 0;
+        for (std::size_t k = 0; k < scene_.bodies.size(); ++k) {
+            const auto& body = scene_.bodies[k];
+            const Material& m = soils_[body.soil];
+            const double mass = m.density * scene_.particle_volume() * double(filling_.body_count(int(k)));
+            const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene_.space.spacing});
+            scale += mass * (length(forces_.gravity) * size + 0.5 * dot(body.velocity, body.velocity) +
+                             1e-6 * m.sound_speed * m.sound_speed);
+        }
+        clock_.energy_unit = std::exp2(std::floor(std::log2(scale)) - 58);
+    }
+}
+
+void Simulation::cut_by_counts()
+{
+    // Each rank counts a share of the blocks; nobody makes a particle yet.
+    const auto& b = filling_.soil_bounds();
+    const Vector far = b.high;
+    const Block lo = domain_.block_of(b.low), hi = domain_.block_of(far);
+    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
+    std::vector<BlockWork> mine;
+    std::int64_t k = 0;
+    const auto edge = [&](double o, double s, std::int32_t i) { return o + s * i; };
+    for (auto x = lo[0]; x <= hi[0]; ++x)
+        for (auto y = lo[1]; y <= hi[1]; ++y)
+            for (auto z = lo[2]; z <= hi[2]; ++z, ++k) {
+                if (k % comm_.size() != comm_.rank()) continue;
+                const double inset = 1e-9 * scene_.space.spacing;
+                const scene::Box box{{edge(origin.x, size.x, x), edge(origin.y, size.y, y), edge(origin.z, size.z, z)},
+                                     {edge(origin.x, size.x, x + 1) - inset, edge(origin.y, size.y, y + 1) - inset,
+                                      edge(origin.z, size.z, z + 1) - inset}};
+                const double n = double(filling_.soil_count_in(box));
+                if (n > 0) mine.push_back({{x, y, z}, n, n});
+            }
+    const auto report = timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes())}); });
+    rebalance_ = Rebalance(report.imbalance, report.seconds);
+}
+
+void Simulation::fill()
+{
+    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
+    struct Start {
+        std::int64_t id;
+        Vector x;
+        int body;
+    };
+    std::vector<Start> start;
+    for (std::size_t k = 0; k < domain_.blocks().size(); ++k) {
+        if (domain_.owners()[k] != comm_.rank()) continue;
+        const Block b = domain_.blocks()[k];
+        const double margin = 1e-6 * scene_.space.spacing;
+        const scene::Box box{{origin.x + size.x * b[0] - margin, origin.y + size.y * b[1] - margin, origin.z + size.z * b[2] - margin},
+                             {origin.x + size.x * (b[0] + 1) + margin, origin.y + size.y * (b[1] + 1) + margin,
+                              origin.z + size.z * (b[2] + 1) + margin}};
+        filling_.for_each_soil_in(box, [&](std::int64_t id, Vector x, int body) {
+            if (domain_.block_of(x) == b) start.push_back({id, x, body});
+        });
+    }
+    auto& p = particles_;
+    p.resize(Index(start.size()));
+    ensure(comm_.sum(std::int64_t(start.size())) == filling_.soil_count(), "the ranks together do not hold the scene's soil");
+    const InitialStress at_rest(scene_, filling_, soils_);
+    const Index n = p.size();
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) {
+        const auto& s = start[i];
+        const auto& body = scene_.bodies[s.body];
+        const Material& m = soils_[body.soil];
+        Vector v = body.velocity;
+        if (scene_.dimensions == 2) v.y = 0;
+        p[field::position].set(i, s.x), p[field::origin].set(i, s.x), p[field::sorted_position].set(i, s.x);
+        p[field::velocity].set(i, v), p[field::half_velocity].set(i, v);
+        p[field::density].set(i, m.density), p[field::half_density].set(i, m.density);
+        p[field::id].set(i, s.id), p[field::soil].set(i, std::int32_t(body.soil));
+        if (body.stress == scene::InitialStress::AtRest) {
+            const Stress sigma = at_rest(s.x, body.soil);
+            p[field::stress].set(i, sigma), p[field::half_stress].set(i, sigma);
+        }
+    }
+}
+
+double Simulation::next_dt() const
+{
+    const double end = scene_.time.end;
+    if (scene_.time.step) return clock_.step < std::llround(end / *scene_.time.step) ? *scene_.time.step : 0;
+    if (clock_.time >= end) return 0;
+    // dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|) )
+    const double h = scene_.smoothing_length(), a = std::sqrt(clock_.extremes.acceleration2);
+    const double limit = std::min(h / clock_.extremes.signal, a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity());
+    const double dt = scene_.accuracy.cfl * limit;
+    // The last step is shortened to end on time; a remainder of round-off is not a step.
+    return clock_.time + dt * (1 + 1e-9) >= end ? end - clock_.time : dt;
+}
+
+bool Simulation::outgrown() const { return !built_ || 2 * std::sqrt(clock_.extremes.moved2) > skin_ * (1 - 1e-6); }
+
+Wishes Simulation::step(Wishes mine)
+{
+    const double dt = next_dt();
+    ensure(dt > 0, "a finished run was asked for another step");
+    if (outgrown()) rebuild(true);
+    forces_.damping = 0;
+    if (const auto& d = scene_.effects.damping; d && clock_.time < d->until) {
+        // mu_d = ratio * 2 omega_1, omega_1 = pi c_p/(2 H): critical for the lowest mode of a column of height H
+        const auto& b = filling_.soil_bounds();
+        double c = 0;
+        for (const auto& m : soils_) c = std::max(c, m.sound_speed);
+        forces_.damping = d->ratio * std::numbers::pi * c / (b.high.z - b.low.z + scene_.space.spacing);
+    }
+
+    PassResult result;
+    std::visit(
+        [&](auto& buffers) {
+            using T = std::remove_cvref_t<decltype(buffers.now[0].vx)>;
+            const bool tensile = model_->tensile();
+            const Index n = particles_.size();
+            Pass<T> pass{.particles = &particles_,
+                         .records = buffers.now.data(),
+                         .next = buffers.next.data(),
+                         .tension = tensile ? buffers.tension.data() : nullptr,
+                         .next_tension = tensile ? buffers.next_tension.data() : nullptr,
+                         .n_records = n + n_ghosts_,
+                         .lists = &lists_,
+                         .walls = buffers.walls,
+                         .soils = soils_,
+                         .volume = scene_.particle_volume(),
+                         .h = scene_.smoothing_length(),
+                         .dt = dt,
+                         .kick = 0.5 * (clock_.dt + dt),
+                         .forces = forces_,
+                         .energy_unit = clock_.energy_unit,
+                         .low = scene_.space.low,
+                         .high = scene_.space.high};
+            for (int axis = 0; axis < 3; ++axis) // a periodic axis has no way out
+                if (scene_.space.periodic[axis] && pass.low) {
+                    const double all = std::numeric_limits<double>::infinity();
+                    (axis == 0 ? pass.low->x : axis == 1 ? pass.low->y : pass.low->z) = -all;
+                    (axis == 0 ? pass.high->x : axis == 1 ? pass.high->y : pass.high->z) = all;
+                }
+            timers_.timed(Phase::HaloBegin, [&] {
+                halo_->begin([&](Index owned, Vector shift, std::byte* to) {
+                    Record<T> r = buffers.now[owned];
+                    if constexpr (std::is_same_v<T, double>) r.x += shift.x, r.y += shift.y, r.z += shift.z;
+                    else
+                        r.x = Place<T>(std::uint32_t(r.x) + std::uint32_t(buffers.place(shift.x))),
+                        r.y = Place<T>(std::uint32_t(r.y) + std::uint32_t(buffers.place(shift.y))),
+                        r.z = Place<T>(std::uint32_t(r.z) + std::uint32_t(buffers.place(shift.z)));
+                    std::memcpy(to, &r, sizeof r);
+                    if (tensile) std::memcpy(to + sizeof r, &buffers.tension[owned], sizeof buffers.tension[owned]);
+                });
+            });
+            result = timers_.timed(Phase::Interior, [&] { return model_->run(pass, lists_.interior()); });
+            timers_.timed(Phase::HaloWait, [&] {
+                halo_->arrive([&](Index slot, const std::byte* row) {
+                    std::memcpy(&buffers.now[n + slot], row, sizeof(Record<T>));
+                    if (tensile) std::memcpy(&buffers.tension[n + slot], row + sizeof(Record<T>), sizeof(Tension<T>));
+                });
+            });
+            const PassResult rim = timers_.timed(Phase::Rim, [&] { return model_->run(pass, lists_.rim()); });
+            const auto add = [](PassResult& a, const PassResult& b) {
+                a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
+                a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
+                a.pairs += b.pairs;
+                auto& e = a.extremes;
+                e = {std::max(e.acceleration2, b.extremes.acceleration2), std::max(e.signal, b.extremes.signal),
+                     std::max(e.moved2, b.extremes.moved2),               std::max(e.speed2, b.extremes.speed2),
+                     std::max(e.bad, b.extremes.bad),                     std::max(e.outside, b.extremes.outside)};
+            };
+            add(result, rim);
+            buffers.now.swap(buffers.next);
+            buffers.tension.swap(buffers.next_tension);
+        },
+        buffers_);
+
+    my_pairs_ += result.pairs;
+    my_particle_steps_ += particles_.size();
+    clock_.dissipated.add(result.energy, clock_.energy_unit);
+    clock_.step += 1;
+    clock_.time = scene_.time.step ? double(clock_.step) * *scene_.time.step
+                  : clock_.time + dt * (1 + 1e-9) >= scene_.time.end ? scene_.time.end
+                                                                     : clock_.time + dt;
+    clock_.dt = dt;
+    timers_.timed(Phase::Reduce, [&] {
+        Extremes& e = result.extremes;
+        double all[] = {e.acceleration2, e.signal, e.moved2, e.speed2, e.bad, e.outside, double(mine.stop), double(mine.checkpoint)};
+        comm_.max(std::span<double>(all));
+        clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5]};
+        mine = {all[6] != 0, all[7] != 0};
+    });
+    if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0) report_failure();
+    return mine;
+}
+
+void Simulation::report_failure()
+{
+    // The lowest id among the offenders, so that the message does not depend on the ranks.
+    const auto& p = particles_;
+    std::int64_t mine = std::numeric_limits<std::int64_t>::max();
+    Index where = -1;
+    const auto finite = [](Vector a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); };
+    for (Index i = 0; i < p.size(); ++i) {
+        const Vector x = p[field::position][i];
+        bool failed = !finite(x) || !finite(p[field::velocity][i]) || !std::isfinite(trace(p[field::stress][i])) ||
+                      !std::isfinite(p[field::density][i]);
+        if (scene_.space.low) {
+            const Vector lo = *scene_.space.low, hi = *scene_.space.high;
+            const auto out = [&](int axis, double v, double a, double b) { return !scene_.space.periodic[axis] && (v < a || v > b); };
+            failed = failed || out(0, x.x, lo.x, hi.x) || (scene_.dimensions == 3 && out(1, x.y, lo.y, hi.y)) || out(2, x.z, lo.z, hi.z);
+        }
+        if (failed && p[field::id][i] < mine) mine = p[field::id][i], where = i;
+    }
+    std::int64_t lowest = mine;
+    comm_.min(std::span(&lowest, 1));
+    std::string text;
+    int root = 0;
+    if (where >= 0 && mine == lowest) {
+        const Vector x = p[field::position][where], v = p[field::velocity][where];
+        const bool box = clock_.extremes.bad == 0;
+        text = box ? fmt::format("particle {} (body {}) left the box at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. "
+                                 "Remedy: a larger space.low/space.high, a longer wall, or a smaller step",
+                                 mine, filling_.body_of(mine), x.x, x.y, x.z, length(v), clock_.step, clock_.time)
+                   : fmt::format("the numbers of particle {} (body {}) are no longer finite at ({:.4g}, {:.4g}, {:.4g}) m in step {}, t = {:.6g} s: "
+                                 "the time step is too long for the stiffness (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
+                                 "accuracy.cfl, or more viscosity",
+                                 mine, filling_.body_of(mine), x.x, x.y, x.z, clock_.step, clock_.time, clock_.dt,
+                                 scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed);
+        root = comm_.rank();
+    }
+    root = int(comm_.max(std::int64_t(root)));
+    throw NumbersFailed(comm_.broadcast(text, root));
+}
+
+std::size_t Simulation::row_bytes() const
+{
+    const bool mixed = model_->precision() == scene::Precision::Mixed;
+    const std::size_t record = mixed ? sizeof(Record<float>) : sizeof(Record<double>);
+    return record + (model_->tensile() ? record / 2 : 0);
+}
+
+void Simulation::wrap_periodic()
+{
+    if (!scene_.space.low) return;
+    const Vector lo = *scene_.space.low, hi = *scene_.space.high;
+    const auto wrap = [&](int axis, double a, double b) {
+        if (!scene_.space.periodic[axis]) return;
+        double* x = particles_[field::position].column[axis];
+        double* o = particles_[field::origin].column[axis];
+        for (Index i = 0; i < particles_.size(); ++i) {
+            const double turns = std::floor((x[i] - a) / (b - a));
+            if (turns == 0) continue;
+            x[i] -= turns * (b - a), o[i] -= turns * (b - a);
+            x[i] = std::min(std::max(x[i], a), b);
+        }
+    };
+    wrap(0, lo.x, hi.x), wrap(1, lo.y, hi.y), wrap(2, lo.z, hi.z);
+}
+
+void Simulation::recut()
+{
+    // What this rank's time went to, block by block: pairs in the lists, and a little for each particle.
+    std::map<Block, std::pair<double, double>> cost;
+    const auto x = particles_[field::position];
+    if (built_ && lists_.size() > 0)
+        for (Index c = 0; c < lists_.size(); ++c) {
+            auto& [work, n] = cost[domain_.block_of(x[lists_.first(c)])];
+            work += double(lists_.soil(c).size()) + 0.5 * double(lists_.walls(c).size()) + 8.0 * lists_.count(c);
+            n += lists_.count(c);
+        }
+    std::vector<BlockWork> mine;
+    for (const auto& [b, w] : cost) mine.push_back({b, w.first, w.second});
+    const double begin = omp_get_wtime();
+    timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes())}); });
+    rebalance_.cut(comm_, omp_get_wtime() - begin);
+    ++structure_.cuts;
+}
+
+void Simulation::together(const std::function<void()>& work)
+{
+    std::string complaint;
+    try {
+        work();
+    } catch (const NumbersFailed& e) {
+        complaint = e.what();
+    }
+    const int worst = int(comm_.max(std::int64_t(complaint.empty() ? -1 : comm_.rank())));
+    if (worst >= 0) throw NumbersFailed(comm_.broadcast(complaint, worst));
+}
+
+void Simulation::rebuild(bool sort_anew)
+{
+    auto& p = particles_;
+    if (sort_anew) {
+        timers_.timed(Phase::Migrate, [&] {
+            wrap_periodic();
+            if (comm_.size() > 1) {
+                const double busy = timers_.seconds(Phase::Interior) + timers_.seconds(Phase::Rim);
+                const bool due = built_ && rebalance_.due(comm_, busy - busy_before_);
+                busy_before_ = busy;
+                structure_.imbalance = rebalance_.imbalance();
+                if (due || (options_.recut_every > 0 && built_ && structure_.rebuilds % options_.recut_every == 0)) recut();
+                structure_.migrated += domain_.migrate(p).left;
+            }
+            const Index n = p.size();
+            const auto x = p[field::position], to = p[field::sorted_position];
+            for (int c = 0; c < 3; ++c)
+#pragma omp parallel for schedule(static)
+                for (Index i = 0; i < n; ++i) to.column[c][i] = x.column[c][i];
+        });
+    }
+    together([&] { timers_.timed(Phase::Sort, [&] {
+        const auto x = p[field::sorted_position];
+        sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
+        p.gather(sorted_.order);
+    }); });
+    timers_.timed(Phase::Ghosts, [&] {
+        halo_.emplace(comm_, domain_.plan_halo(std::as_const(p)[field::sorted_position], p.size(), reach_), row_bytes());
+        const auto arrived = halo_->ghosts(p);
+        n_ghosts_ = Index(arrived.size());
+        Array<double> x(n_ghosts_), y(n_ghosts_), z(n_ghosts_);
+        Array<std::int64_t> id(n_ghosts_);
+        for (Index k = 0; k < n_ghosts_; ++k)
+            x[k] = arrived[k].sorted_position.x, y[k] = arrived[k].sorted_position.y, z[k] = arrived[k].sorted_position.z, id[k] = arrived[k].id;
+        ghost_sorted_ = sort_into_columns(columns_, x.data(), y.data(), z.data(), id.data(), n_ghosts_);
+        ghost_x_.resize(n_ghosts_), ghost_y_.resize(n_ghosts_), ghost_z_.resize(n_ghosts_), ghost_id_.resize(n_ghosts_);
+        std::vector<Index> slot(n_ghosts_);
+        for (Index k = 0; k < n_ghosts_; ++k) {
+            const Index from = ghost_sorted_.order[k];
+            ghost_x_[k] = x[from], ghost_y_[k] = y[from], ghost_z_[k] = z[from], ghost_id_[k] = id[from];
+            slot[from] = k;
+        }
+        halo_->place(slot);
+        renew_walls();
+    });
+    timers_.timed(Phase::Lists, [&] {
+        const auto x = std::as_const(p)[field::sorted_position];
+        const SortedPoints owned{x.column[0], x.column[1], x.column[2], std::as_const(p)[field::id].column[0], &sorted_, p.size()};
+        const SortedPoints ghosts{ghost_x_.data(), ghost_y_.data(), ghost_z_.data(), ghost_id_.data(), &ghost_sorted_, n_ghosts_};
+        lists_.build(columns_, owned, ghosts, walls_, reach_, model_->cluster_width());
+        make_records();
+    });
+    if (sort_anew) clock_.extremes.moved2 = 0;
+    built_ = true;
+    ++structure_.rebuilds;
+}
+
+void Simulation::renew_walls()
+{
+    if (scene_.walls.empty()) return;
+    const auto x = std::as_const(particles_)[field::sorted_position];
+    const double all = std::numeric_limits<double>::max();
+    Vector lo{all, all, all}, hi{-all, -all, -all};
+    for (Index i = 0; i < particles_.size(); ++i) {
+        const Vector a = x[i];
+        lo = {std::min(lo.x, a.x), std::min(lo.y, a.y), std::min(lo.z, a.z)};
+        hi = {std::max(hi.x, a.x), std::max(hi.y, a.y), std::max(hi.z, a.z)};
+    }
+    const auto inside = [](const scene::Box& a, const scene::Box& b) {
+        return a.low.x >= b.low.x && a.low.y >= b.low.y && a.low.z >= b.low.z && a.high.x <= b.high.x && a.high.y <= b.high.y &&
+               a.high.z <= b.high.z;
+    };
+    if (particles_.size() == 0) return;
+    const Vector margin{reach_, reach_, reach_}, ahead = 3.0 * margin;
+    if (wall_region_ && inside({lo - margin, hi + margin}, *wall_region_)) return;
+    wall_region_ = scene::Box{lo - margin - ahead, hi + margin + ahead};
+    walls_.assign(scene_.walls.size(), {});
+    for (std::size_t w = 0; w < walls_.size(); ++w) walls_[w].wall = int(w);
+    // Walls repeat with the period as the soil does.
+    Vector step = period(scene_);
+    const int px = scene_.space.periodic[0], py = scene_.space.periodic[1], pz = scene_.space.periodic[2];
+    for (int a = -px; a <= px; ++a)
+        for (int b = -py; b <= py; ++b)
+            for (int c = -pz; c <= pz; ++c) {
+                const Vector shift{a * step.x, b * step.y, c * step.z};
+                filling_.for_each_wall_in({wall_region_->low - shift, wall_region_->high - shift}, [&](std::int64_t id, Vector at, int w) {
+                    walls_[w].x.push_back(at.x + shift.x), walls_[w].y.push_back(at.y + shift.y), walls_[w].z.push_back(at.z + shift.z);
+                    walls_[w].id.push_back(id);
+                });
+            }
+    for (auto& w : walls_) w.sort(columns_);
+    std::visit(
+        [&](auto& buffers) {
+            buffers.walls.resize(walls_.size());
+            for (std::size_t w = 0; w < walls_.size(); ++w) {
+                auto& to = buffers.walls[w];
+                const std::size_t n = walls_[w].x.size();
+                to.wall = &scene_.walls[w];
+                to.x.resize(n), to.y.resize(n), to.z.resize(n);
+                for (std::size_t k = 0; k < n; ++k)
+                    to.x[k] = buffers.place(walls_[w].x[k]), to.y[k] = buffers.place(walls_[w].y[k]), to.z[k] = buffers.place(walls_[w].z[k]);
+            }
+        },
+        buffers_);
+}
+
+void Simulation::make_records()
+{
+    std::visit(
+        [&](auto& buffers) {
+            using T = std::remove_cvref_t<decltype(buffers.now[0].vx)>;
+            const auto& p = std::as_const(particles_);
+            const Index n = p.size();
+            const std::size_t count = std::size_t(n) + n_ghosts_ + Particles::padding + 1;
+            buffers.now.resize(count), buffers.next.resize(count);
+            const bool tensile = model_->tensile();
+            if (tensile) buffers.tension.resize(count), buffers.next_tension.resize(count);
+            const double epsilon = scene_.effects.artificial_stress ? scene_.effects.artificial_stress->epsilon : 0;
+#pragma omp parallel for schedule(static)
+            for (Index i = 0; i < n; ++i) {
+                const Material& m = soils_[p[field::soil][i]];
+                const double rho = p[field::density][i];
+                buffers.now[i] = make_record<T>(buffers.place, p[field::position][i], p[field::velocity][i],
+                                                scene_.particle_volume() * m.density / rho, rho, p[field::stress][i], m.sound_speed);
+                if (tensile) buffers.tension[i] = make_tension<T>(p[field::stress][i], epsilon);
+            }
+            for (std::size_t k = n; k < count; ++k) {
+                buffers.now[k] = buffers.next[k] = far_away<T>();
+                if (tensile) buffers.tension[k] = buffers.next_tension[k] = {};
+            }
+        },
+        buffers_);
+}
+
+Ledger Simulation::ledger() const
+{
+    Ledger l;
+    l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, clock_.energy_unit * 65536);
+    const auto& d = clock_.dissipated;
+    std::int64_t units[] = {d.plastic, d.viscous, d.wall, d.damping};
+    comm_.sum(std::span<std::int64_t>(units));
+    const double u = clock_.energy_unit;
+    l.dissipated = {double(units[0]) * u, double(units[1]) * u, double(units[2]) * u, double(units[3]) * u};
+    return l;
+}
+
+double Simulation::residual(const Ledger& l) const
+{
+    const double excess = l.sum() - clock_.energy_at_start;
+    const double drop = -l.state.potential;
+    const double scale = drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
+    return scale > 0 ? excess / scale : 0;
+}
+
+std::int64_t Simulation::pairs() const { return comm_.sum(my_pairs_ + clock_.pairs); }
+
+Clock Simulation::clock() const
+{
+    Clock c = clock_;
+    c.pairs = pairs();
+    std::int64_t units[] = {c.dissipated.plastic, c.dissipated.viscous, c.dissipated.wall, c.dissipated.damping};
+    comm_.sum(std::span<std::int64_t>(units));
+    c.dissipated = {units[0], units[1], units[2], units[3]};
+    return c;
+}
+
+WorkDone Simulation::work_done() const { return {clock_.step, my_particle_steps_, my_pairs_}; }
+
+std::size_t Simulation::memory_bytes() const
+{
+    std::size_t b = particles_.bytes_per_particle() * particles_.size() + lists_.bytes();
+    std::visit(
+        [&](const auto& buffers) {
+            b += (buffers.now.capacity() + buffers.next.capacity()) * sizeof(buffers.now[0]);
+            b += (buffers.tension.capacity() + buffers.next_tension.capacity()) * sizeof(buffers.tension[0]);
+            for (const auto& w : buffers.walls) b += w.x.size() * 3 * sizeof(w.x[0]);
+        },
+        buffers_);
+    for (const auto& w : walls_) b += w.x.size() * (3 * sizeof(double) + sizeof(std::int64_t) + sizeof(Index));
+    return b + std::size_t(n_ghosts_) * 32;
+}
+
+} // namespace kuzure

@@ -1,0 +1,141 @@
+#pragma once
+// One run in memory: the particles of this rank, their neighbours, and the time step. Everything a user sees of it
+// (files, messages) is made by solver/app/commands.
+#include "decomposition/domain.hpp"
+#include "decomposition/rebalance.hpp"
+#include "perf/phases.hpp"
+#include "perf/report.hpp"
+#include "solver/app/energy.hpp"
+#include "solver/kernels/step.hpp"
+#include "solver/scene/fill.hpp"
+#include <functional>
+#include <variant>
+
+namespace kuzure {
+
+/// How a run is carried out; none of it changes a bit of the result but `arithmetic` in mixed precision.
+struct RunOptions {
+    Arithmetic arithmetic = Arithmetic::Lanes;
+    int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
+    int blocks_per_rank = 50;
+};
+
+/// What a rank wants to happen after a step; travels with the step's only reduction.
+struct Wishes {
+    bool stop = false, checkpoint = false;
+};
+
+/// Where a run stands, beside the particles: what a checkpoint keeps to go on bit for bit.
+struct Clock {
+    double time = 0;      // s
+    std::int64_t step = 0;
+    double dt = 0;        // s, length of the step before
+    Extremes extremes{};  // of the step before, over all particles
+    std::int64_t pairs = 0; // summed over steps and ranks (kept by rank 0)
+    DissipatedUnits dissipated; // over ranks (kept by rank 0)
+    double energy_at_start = 0; // J
+    double energy_unit = 0;     // J
+};
+
+class Simulation {
+public:
+    /// Fills the scene (with effects resolved). Collective. Throws BadInput.
+    Simulation(const Comm&, const Scene&, RunOptions = {});
+    /// Goes on from particles read anywhere and the clock of their checkpoint. Collective.
+    Simulation(const Comm&, const Scene&, Particles, const Clock&, RunOptions = {});
+    ~Simulation();
+
+    /// One step of the leap-frog; one pass over pairs. Collective. Gives what any rank wished for, on every rank.
+    /// Throws NumbersFailed on every rank together.
+    Wishes step(Wishes mine = {});
+    /// Length of the next step, s; 0 when the end time is reached.
+    double next_dt() const;
+    bool finished() const { return next_dt() == 0; }
+
+    double time() const { return clock_.time; }
+    std::int64_t steps() const { return clock_.step; }
+    double dt() const { return clock_.dt; }
+    double max_speed() const { return std::sqrt(clock_.extremes.speed2); }
+    const Particles& particles() const { return particles_; }
+    const scene::Filling& filling() const { return filling_; }
+    const Scene& scene() const { return scene_; }
+    std::span<const Material> soils() const { return soils_; }
+    const PairModel& model() const { return *model_; }
+    const Comm& comm() const { return comm_; }
+    Timers& timers() { return timers_; }
+
+    /// Collective: energies of now.
+    Ledger ledger() const;
+    /// (sum of energies - that at the start)/(potential drop).
+    double residual(const Ledger&) const;
+    /// Collective: the clock with everything that other ranks know summed up on every rank.
+    Clock clock() const;
+    /// Collective: pairs over all ranks since the start.
+    std::int64_t pairs() const;
+    WorkDone work_done() const;
+
+    struct Structure {
+        std::int64_t rebuilds = 0, cuts = 0, migrated = 0;
+        double imbalance = 1; // max/mean of the ranks' busy seconds, as last measured
+    };
+    const Structure& structure() const { return structure_; }
+    Index ghosts() const { return n_ghosts_; }
+    std::int64_t halo_bytes() const { return halo_ ? halo_->bytes_per_refresh() : 0; }
+    int halo_messages() const { return halo_ ? halo_->messages_per_refresh() : 0; }
+    /// Bytes of this rank's large arrays.
+    std::size_t memory_bytes() const;
+
+private:
+    template <class T> struct Buffers {
+        Places<T> place;
+        Array<Record<T>> now, next;
+        Array<Tension<T>> tension, next_tension;
+        std::vector<WallRecords<T>> walls;
+        explicit Buffers(double h) : place(h) {}
+    };
+
+    void prepare();
+    void fill();
+    void cut_by_counts();
+    void recut();
+    void rebuild(bool sort_anew);
+    /// What fails on one rank fails on all, with the words of the highest such rank.
+    void together(const std::function<void()>& work);
+    void wrap_periodic();
+    void renew_walls();
+    void make_records();
+    bool outgrown() const;
+    std::size_t row_bytes() const;
+    [[noreturn]] void report_failure();
+    double smallest_time_scale() const;
+
+    const Comm& comm_;
+    Scene scene_;
+    RunOptions options_;
+    scene::Filling filling_;
+    std::vector<Material> soils_;
+    std::unique_ptr<PairModel> model_;
+    Columns columns_;
+    Domain domain_;
+    Rebalance rebalance_;
+    Particles particles_;
+    ColumnSort sorted_, ghost_sorted_;
+    Array<double> ghost_x_, ghost_y_, ghost_z_;
+    Array<std::int64_t> ghost_id_;
+    Index n_ghosts_ = 0;
+    std::optional<Halo> halo_;
+    ClusterLists lists_;
+    std::vector<WallPoints> walls_;
+    std::optional<scene::Box> wall_region_;
+    std::variant<Buffers<double>, Buffers<float>> buffers_;
+    StepForces forces_;
+    double reach_, skin_; // m
+    Clock clock_;
+    bool built_ = false;
+    double busy_before_ = 0;
+    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0;
+    Structure structure_;
+    Timers timers_;
+};
+
+} // namespace kuzure

@@ -1,0 +1,561 @@
+#pragma once
+// The pass over pairs, written. Included by variant.cpp only, so that each model is compiled once, in its own object.
+//
+// V: number type of the pair sums (lanes of float in mixed precision), U: of the update, always double. Cluster by
+// cluster: find the list entries in reach now, geometry of each, sums, then constitutive law and leap-frog, while the
+// sums are in the first-level cache. Sums are centred on i, which owns a lane; j is broadcast to all lanes and comes in
+// the global order. What lies beyond the support adds exact zeros, so the bits do not depend on list or cluster.
+#include "solver/kernels/step.hpp"
+#include "solver/physics/drucker_prager.hpp"
+#include "solver/physics/model.hpp"
+#include "solver/scene/shape.hpp"
+#include <bit>
+#include <omp.h>
+
+namespace kuzure {
+
+namespace pass {
+
+template <class V> inline constexpr bool single = std::is_same_v<number<V>, float>;
+template <class V> using Update = std::conditional_t<width<V> == 1, double, Native<double>>;
+
+/// Positions of the particles of a cluster, and their difference to one neighbour.
+template <class V, bool Fixed = single<V>> struct Positions {
+    Vec3<V> x;
+    template <class T> KUZURE_INLINE Vec3<V> minus(const Record<T>& j) const { return {x.x - j.x, x.y - j.y, x.z - j.z}; }
+    KUZURE_INLINE Vec3<V> minus(Place<double> jx, Place<double> jy, Place<double> jz) const
+    {
+        return {x.x - jx, x.y - jy, x.z - jz};
+    }
+};
+template <class V> struct Positions<V, true> {
+    static constexpr int W = width<V>;
+    using Int = typename detail::VectorOf<std::uint32_t, (W < 2 ? 2 : W)>::type;
+    using Signed = typename detail::VectorOf<std::int32_t, (W < 2 ? 2 : W)>::type;
+    Int x, y, z;
+    template <class T> KUZURE_INLINE Vec3<V> minus(const Record<T>& j) const { return minus(j.x, j.y, j.z); }
+    KUZURE_INLINE Vec3<V> minus(std::int32_t jx, std::int32_t jy, std::int32_t jz) const
+    {
+        return {to_h(x - std::uint32_t(jx)), to_h(y - std::uint32_t(jy)), to_h(z - std::uint32_t(jz))};
+    }
+
+private:
+    /// Fixed-point difference to units of h; exact below 16 h.
+    static KUZURE_INLINE V to_h(Int d)
+    {
+        constexpr float unit = 1.0f / 1048576;
+        if constexpr (W == 1) return float(std::int32_t(d[0])) * unit;
+        else return V(__builtin_convertvector((Signed)d, typename V::Vec)) * unit;
+    }
+};
+
+/// What the lanes of a cluster hold of their own particles.
+template <class V> struct Here {
+    Positions<V> position;
+    Vec3<V> v;
+    V rho, c;
+    Index first;
+    int count;
+    unsigned owned; // a bit for each lane that holds a particle of this cluster
+};
+
+/// Sums of one cluster, in double, ready for the update: rows of W lanes.
+template <int W, bool Tensile> struct alignas(64) Sums {
+    double grad_v[9][W];   // sum V_j (v_j - v_i) (x) shape r
+    double force[3][W];    // sum V_j (sigma_j - rho_i rho_j Pi) . shape r
+    double grad_one[3][W]; // sum V_j shape r
+    double power[W];       // sum V_j rho_i rho_j Pi approach shape
+    double close[Tensile ? 3 : 1][W]; // sum V_j f^n shape r
+};
+
+template <class V> KUZURE_INLINE V load_narrow(const double* p)
+{
+    if constexpr (!single<V>) return load<V>(p);
+    else if constexpr (width<V> == 1) return float(*p);
+    else {
+        typename detail::VectorOf<double, width<V>>::type wide;
+        std::memcpy(&wide, p, sizeof wide);
+        return V(__builtin_convertvector(wide, typename V::Vec));
+    }
+}
+template <class V> KUZURE_INLINE void store_wide(double* p, V a)
+{
+    if constexpr (!single<V>) store(p, a);
+    else if constexpr (width<V> == 1) *p = double(a);
+    else {
+        const auto wide = __builtin_convertvector(a.v, typename detail::VectorOf<double, width<V>>::type);
+        std::memcpy(p, &wide, sizeof wide);
+    }
+}
+
+template <class V, class T> Positions<V> positions_of(const Record<T>* records, Index first)
+{
+    Positions<V> p;
+    if constexpr (single<V>) {
+        for (int k = 0; k < width<V>; ++k) {
+            p.x[k] = std::uint32_t(records[first + k].x);
+            p.y[k] = std::uint32_t(records[first + k].y);
+            p.z[k] = std::uint32_t(records[first + k].z);
+        }
+    } else if constexpr (width<V> == 1) {
+        p.x = {records[first].x, records[first].y, records[first].z};
+    } else {
+        for (int k = 0; k < width<V>; ++k) {
+            p.x.x.v[k] = records[first + k].x;
+            p.x.y.v[k] = records[first + k].y;
+            p.x.z.v[k] = records[first + k].z;
+        }
+    }
+    return p;
+}
+
+/// The pair sums of one cluster with its soil neighbours; returns the pairs inside the support.
+template <class Model, class V, class T>
+KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, std::span<const Index> list, const Record<T>* records,
+                                         const Tension<T>* tension, Index far_away, Sums<width<V>, Model::tensile>& out)
+{
+    constexpr int batch = 16, room = 256;
+    const V support(T(2 * model.kernel.h)), support2(T(4 * model.kernel.h * model.kernel.h));
+    const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0));
+    struct alignas(64) Terms {
+        Vec3<V> grad, v;
+        V pressure, close;
+    };
+    Terms terms[batch];
+    Index near[room + batch];
+    Mat3<V> L{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+    Vec3<V> A{zero, zero, zero}, G = A, F = A;
+    V power = zero;
+    std::int64_t pairs = 0;
+
+    for (std::size_t begin = 0; begin < list.size(); begin += room) {
+        const std::size_t end = std::min(list.size(), begin + room);
+        int n = 0;
+        for (std::size_t k = begin; k < end; ++k) {
+            const Vec3<V> r = i.position.minus(records[list[k]]);
+            const unsigned hits = bits(less(dot(r, r), support2)) & i.owned;
+            near[n] = list[k];
+            n += hits != 0;
+            pairs += std::popcount(hits);
+        }
+        if constexpr (width<V> > 1)
+            while (n % 2) near[n++] = far_away;
+
+        for (int b = 0; b < n; b += batch) {
+            const int m = std::min(batch, n - b);
+            // ---- geometry: gradient of W, approach, viscosity
+            for (int k = 0; k < m; ++k) {
+                const Record<T>& j = records[near[b + k]];
+                const Vec3<V> r = i.position.minus(j);
+                const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+                const V r2 = max(dot(r, r), tiny);
+                const V rho_sum = i.rho + j.density;
+                const auto inv = reciprocals(r2, (r2 + softening) * rho_sum);
+                const V length = r2 * inv.inverse_sqrt;
+                const V t = max(support - length, zero);
+                const V w = model.kernel.shape(t, length, inv.inverse_sqrt) * j.volume;
+                terms[k].grad = w * r;
+                terms[k].v = v;
+                if constexpr (Model::viscous) {
+                    // rho_i rho_j Pi > 0 where the two approach
+                    const V approach = max(dot(v, r), zero);
+                    const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.sound_speed)};
+                    const V pressure = model.viscosity(pair);
+                    terms[k].pressure = pressure;
+                    power = fma(pressure * w, approach, power);
+                }
+                if constexpr (Model::tensile) terms[k].close = model.kernel.value(t);
+            }
+            // ---- grad v = sum_j V_j (v_j - v_i) (x) grad W
+            for (int k = 0; k < m; ++k) {
+                const Vec3<V> g = terms[k].grad, v = terms[k].v;
+                L.x = fma(v.x, g, L.x);
+                L.y = fma(v.y, g, L.y);
+                L.z = fma(v.z, g, L.z);
+            }
+            // ---- rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j - rho_i rho_j Pi + f^n (tau_i + tau_j) ] . grad W
+            for (int k = 0; k < m; ++k) {
+                const Record<T>& j = records[near[b + k]];
+                const Vec3<V> g = terms[k].grad;
+                Sym3<V> s{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)};
+                if constexpr (Model::viscous) s = plus_isotropic(s, -terms[k].pressure);
+                if constexpr (Model::tensile) {
+                    const Tension<T>& tj = tension[near[b + k]];
+                    bool any = tj.any != 0;
+                    for (int l = 0; l < i.count && !any; ++l) any = tension[i.first + l].any != 0;
+                    if (any) {
+                        const V f = model.artificial_stress.closeness(terms[k].close);
+                        s = fma(f, Sym3<V>{V(tj.xx), V(tj.yy), V(tj.zz), V(tj.xy), V(tj.yz), V(tj.xz)}, s);
+                        F = fma(f, g, F);
+                    }
+                }
+                A = A + s * g;
+                G = G + g;
+            }
+        }
+    }
+    const V* rows[] = {&L.x.x, &L.x.y, &L.x.z, &L.y.x, &L.y.y, &L.y.z, &L.z.x, &L.z.y, &L.z.z};
+    for (int k = 0; k < 9; ++k) store_wide(out.grad_v[k], *rows[k]);
+    store_wide(out.force[0], A.x), store_wide(out.force[1], A.y), store_wide(out.force[2], A.z);
+    store_wide(out.grad_one[0], G.x), store_wide(out.grad_one[1], G.y), store_wide(out.grad_one[2], G.z);
+    store_wide(out.power, power);
+    if constexpr (Model::tensile)
+        store_wide(out.close[0], F.x), store_wide(out.close[1], F.y), store_wide(out.close[2], F.z);
+    return pairs;
+}
+
+/// How one particle feels one wall: the surface's distance and normal, what its velocity and stress look like there.
+struct WallContact {
+    double distance;
+    Vector normal, mirrored; // m, 1, m/s: the velocity that the wall mirrors
+    Stress stress;           // the stress that both sides of the surface carry
+};
+
+inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, const Stress& s, int dimensions)
+{
+    const auto c = scene::contact(wall.shape, x, dimensions);
+    WallContact w{c.distance, c.normal, v, s};
+    if (wall.surface == scene::Surface::Rough) return w;
+    // sigma = ... + tau (x) n + n (x) tau: the shear that the surface carries is tau = sigma.n - (n.sigma.n) n
+    const Vector n = c.normal, traction = s * n;
+    const double normal = dot(n, traction);
+    const Vector tau = traction - normal * n;
+    double keep = 0;
+    if (wall.surface == scene::Surface::Coulomb) {
+        const double shear = length(tau), limit = std::tan(wall.friction_angle) * std::max(-normal, 0.0);
+        keep = shear > limit ? limit / shear : 1.0;
+    } else {
+        w.mirrored = dot(v, n) * n;
+    }
+    const double lost = 1 - keep;
+    w.stress = s - Stress{lost * 2 * tau.x * n.x,
+                          lost * 2 * tau.y * n.y,
+                          lost * 2 * tau.z * n.z,
+                          lost * (tau.x * n.y + tau.y * n.x),
+                          lost * (tau.y * n.z + tau.z * n.y),
+                          lost * (tau.x * n.z + tau.z * n.x)};
+    return w;
+}
+
+/// Adds the walls' share to the sums of a cluster; returns the pairs inside the support and the power that walls take.
+/// A wall particle takes the soil particle's density and stress and the mirrored velocity -(d_B/d_A) v (Morris et al.
+/// 1997; Bui et al. 2008, eq. 45), the factor 1 + d_B/d_A capped at 1.5.
+template <class Model, class V, class T>
+[[gnu::noinline]] std::int64_t sum_over_walls(const Model& model, const Here<V>& i, const Pass<T>& pass, std::span<const Index> runs,
+                                              double unit, int dimensions, double scale,
+                                              Sums<width<V>, Model::tensile>& out, double* wall_power)
+{
+    constexpr int W = width<V>;
+    const auto& p = *pass.particles;
+    const auto x = p[field::position], v = p[field::velocity];
+    const auto sigma = p[field::stress];
+    const V support(T(2 * model.kernel.h)), support2(T(4 * model.kernel.h * model.kernel.h));
+    const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0));
+    std::int64_t pairs = 0;
+    while (!runs.empty()) {
+        const WallRecords<T>& wall = pass.walls[runs[0]];
+        const auto list = runs.subspan(2, runs[1]);
+        runs = runs.subspan(2 + runs[1]);
+        WallContact contact[W];
+        T normal[3][W], mirrored[3][W], inverse_distance[W];
+        for (int k = 0; k < W; ++k) {
+            const Index at = i.first + std::min(k, i.count - 1);
+            contact[k] = wall_contact(*wall.wall, x[at], v[at], sigma[at], dimensions);
+            const auto& c = contact[k];
+            normal[0][k] = T(c.normal.x), normal[1][k] = T(c.normal.y), normal[2][k] = T(c.normal.z);
+            mirrored[0][k] = T(c.mirrored.x), mirrored[1][k] = T(c.mirrored.y), mirrored[2][k] = T(c.mirrored.z);
+            // at or below the surface the factor is at its cap
+            inverse_distance[k] = T(c.distance > 1e-9 * unit ? unit / c.distance : 1e9);
+        }
+        const Vec3<V> n{load<V>(normal[0]), load<V>(normal[1]), load<V>(normal[2])};
+        const Vec3<V> vm{load<V>(mirrored[0]), load<V>(mirrored[1]), load<V>(mirrored[2])};
+        const V inverse_d = load<V>(inverse_distance);
+        Vec3<V> G{zero, zero, zero}, B = G, P = G;
+        for (const Index point : list) {
+            const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
+            const V r2_exact = dot(r, r), r2 = max(r2_exact, tiny);
+            const unsigned hits = bits(less(r2_exact, support2)) & i.owned;
+            if (!hits) continue;
+            pairs += std::popcount(hits);
+            const V rho_sum = i.rho + i.rho;
+            const auto inv = reciprocals(r2, (r2 + softening) * rho_sum);
+            const V length = r2 * inv.inverse_sqrt;
+            const V w = model.kernel.shape(max(support - length, zero), length, inv.inverse_sqrt);
+            const Vec3<V> g = w * r;
+            // 1 + d_B/d_A = r.n/d_A, between 1 and 1.5
+            const V factor = min(max(dot(r, n) * inverse_d, V(T(1))), V(T(1.5)));
+            G = G + g;
+            B = fma(factor, g, B);
+            if constexpr (Model::viscous) {
+                const V approach = max(-(factor * dot(vm, r)), zero);
+                const V pressure = model.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
+                P = fma(pressure, g, P);
+            }
+        }
+        double sums[9][W];
+        const V* rows[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
+        for (int k = 0; k < 9; ++k) store_wide(sums[k], *rows[k]);
+        for (int k = 0; k < i.count; ++k) {
+            const WallContact& c = contact[k];
+            const Index at = i.first + k;
+            const Vector g{pass.volume * sums[0][k], pass.volume * sums[1][k], pass.volume * sums[2][k]};
+            const Vector b{pass.volume * sums[3][k], pass.volume * sums[4][k], pass.volume * sums[5][k]};
+            const Vector q{pass.volume * sums[6][k], pass.volume * sums[7][k], pass.volume * sums[8][k]};
+            const Vector elastic = 2.0 * (c.stress * g);
+            out.force[0][k] += elastic.x - q.x, out.force[1][k] += elastic.y - q.y, out.force[2][k] += elastic.z - q.z;
+            const double vk[3] = {-c.mirrored.x, -c.mirrored.y, -c.mirrored.z};
+            for (int a = 0; a < 3; ++a) {
+                out.grad_v[3 * a][k] = fma(vk[a], b.x, out.grad_v[3 * a][k]);
+                out.grad_v[3 * a + 1][k] = fma(vk[a], b.y, out.grad_v[3 * a + 1][k]);
+                out.grad_v[3 * a + 2][k] = fma(vk[a], b.z, out.grad_v[3 * a + 2][k]);
+            }
+            // taken by the wall per unit of rho_i V_i/m_i: -(v.f + sigma : L_wall); viscous: v.q
+            const Stress s = sigma[at];
+            const Vector sb = s * b;
+            const double stress_power = -(c.mirrored.x * sb.x + c.mirrored.y * sb.y + c.mirrored.z * sb.z);
+            wall_power[k] -= scale * (dot(v[at], elastic - q) + stress_power);
+        }
+    }
+    return pairs;
+}
+
+/// Rounds to a multiple of the unit that `magic` stands for (1.5 * 2^52 units): what is summed then is summed exactly.
+template <class U> KUZURE_INLINE U quantized(U x, U magic) { return (x + magic) - magic; }
+
+/// The constitutive law and the leap-frog of the first n lanes at particle `at`; `row` is the lane offset in the sums.
+/// Legend: half-step values carry _h; those at the step's end are predicted from them with half a step of the rates.
+template <class U, class Model, class T, int W>
+KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W, Model::tensile>& sums, const double* wall_power, int row,
+                           Index at, int n, double scale, const Places<T>& place, EnergySums& energy, Extremes& extremes)
+{
+    auto& p = *pass.particles;
+    const auto vx = p[field::velocity], vh = p[field::half_velocity], xx = p[field::position], x_sorted = p[field::sorted_position];
+    const auto sp = p[field::stress], sh = p[field::half_stress];
+    const auto rp = p[field::density], rh = p[field::half_density];
+    const auto plastic = p[field::plastic_strain];
+    const auto soil_of = p[field::soil];
+    const U one(1.0), half(0.5), zero(0.0), factor(scale), dt(pass.dt), kick(pass.kick), half_dt = half * dt;
+
+    // ---- material of each lane
+    Elastoplastic<U> soil;
+    U c, rho0;
+    if (pass.soils.size() == 1) {
+        soil = Elastoplastic<U>::from(pass.soils[0]);
+        c = U(pass.soils[0].sound_speed), rho0 = U(pass.soils[0].density);
+    } else {
+        double table[9][width<U>];
+        for (int k = 0; k < width<U>; ++k) {
+            const Material& m = pass.soils[soil_of[at + std::min(k, n - 1)]];
+            const auto e = Elastoplastic<double>::from(m);
+            const double row_of[9] = {e.shear, e.bulk, e.alpha, e.k, e.nine_k_alpha_psi, e.inverse_denominator, e.apex, m.sound_speed, m.density};
+            for (int q = 0; q < 9; ++q) table[q][k] = row_of[q];
+        }
+        soil = {load<U>(table[0]), load<U>(table[1]), load<U>(table[2]), load<U>(table[3]), load<U>(table[4]), load<U>(table[5]), load<U>(table[6])};
+        c = load<U>(table[7]), rho0 = load<U>(table[8]);
+    }
+
+    const Sym3<U> sigma = sp.template load<U>(at);
+    const U rho = rp.template load<U>(at);
+    const U inverse_rho = one / rho;
+    const auto sum = [&](const double (&rows)[W]) { return load<U>(rows + row); };
+    const Mat3<U> L{{factor * sum(sums.grad_v[0]), factor * sum(sums.grad_v[1]), factor * sum(sums.grad_v[2])},
+                    {factor * sum(sums.grad_v[3]), factor * sum(sums.grad_v[4]), factor * sum(sums.grad_v[5])},
+                    {factor * sum(sums.grad_v[6]), factor * sum(sums.grad_v[7]), factor * sum(sums.grad_v[8])}};
+    const Vec3<U> A{sum(sums.force[0]), sum(sums.force[1]), sum(sums.force[2])};
+    const Vec3<U> G{sum(sums.grad_one[0]), sum(sums.grad_one[1]), sum(sums.grad_one[2])};
+    const Vec3<U> v = vx.template load<U>(at);
+    Vec3<U> f = A + sigma * G;
+    if constexpr (Model::tensile) {
+        const Vec3<U> F{sum(sums.close[0]), sum(sums.close[1]), sum(sums.close[2])};
+        double tau[6][width<U>];
+        for (int k = 0; k < width<U>; ++k) {
+            const Tension<T>& t = pass.tension[at + std::min(k, n - 1)];
+            const double of[6] = {t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
+            for (int q = 0; q < 6; ++q) tau[q][k] = of[q];
+        }
+        f = f + Sym3<U>{load<U>(tau[0]), load<U>(tau[1]), load<U>(tau[2]), load<U>(tau[3]), load<U>(tau[4]), load<U>(tau[5])} * F;
+    }
+
+    // dv/dt = f/rho + g - mu_d v
+    const U mu_d(pass.forces.damping);
+    const Vec3<U> a{fnma(mu_d, v.x, fma(factor * inverse_rho, f.x, U(pass.forces.gravity.x))),
+                    fnma(mu_d, v.y, fma(factor * inverse_rho, f.y, U(pass.forces.gravity.y))),
+                    fnma(mu_d, v.z, fma(factor * inverse_rho, f.z, U(pass.forces.gravity.z)))};
+    // drho/dt = -rho tr L
+    const U rho_rate = -(rho * trace(L));
+    const Sym3<U> D = symmetric_part(L);
+
+    // ---- half-step values: one whole kick. The stress rotates with the material, then the strain loads it.
+    const Vec3<U> v_h = fma(kick, a, vh.template load<U>(at));
+    const U rho_h = fma(kick, rho_rate, rh.template load<U>(at));
+    const Sym3<U> turned = rotate(spin_increment(L, kick), sh.template load<U>(at));
+    const auto mapped = return_to_cone(turned + hooke(kick * D, soil), soil);
+
+    // ---- values at the end of the step: half a step on from there
+    const Vec3<U> x = fma(dt, v_h, xx.template load<U>(at));
+    const Vec3<U> v_end = fma(half_dt, a, v_h);
+    const U rho_end = fma(half_dt, rho_rate, rho_h);
+    const Sym3<U> s_end =
+        return_to_cone(mapped.sigma + spin(spin_increment(L, half_dt), mapped.sigma) + hooke(half_dt * D, soil), soil).sigma;
+    const U volume_end = U(pass.volume) * rho0 / rho_end;
+
+    xx.store(at, x, n);
+    vh.store(at, v_h, n);
+    vx.store(at, v_end, n);
+    rh.store(at, rho_h, n);
+    rp.store(at, rho_end, n);
+    sh.store(at, mapped.sigma, n);
+    sp.store(at, s_end, n);
+    plastic.store(at, plastic.template load<U>(at) + mapped.shear_strain, n);
+
+    // ---- records for the next step's pairs
+    double rows[14][width<U>];
+    const U columns[14] = {x.x, x.y, x.z, v_end.x, v_end.y, v_end.z, volume_end, rho_end, s_end.xx, s_end.yy, s_end.zz, s_end.xy, s_end.yz, s_end.xz};
+    for (int k = 0; k < 14; ++k) store(rows[k], columns[k]);
+    for (int k = 0; k < n; ++k) {
+        Record<T>& r = pass.next[at + k];
+        r.x = place(rows[0][k]), r.y = place(rows[1][k]), r.z = place(rows[2][k]);
+        r.vx = T(rows[3][k]), r.vy = T(rows[4][k]), r.vz = T(rows[5][k]);
+        r.volume = T(rows[6][k]), r.density = T(rows[7][k]);
+        r.xx = T(rows[8][k]), r.yy = T(rows[9][k]), r.zz = T(rows[10][k]);
+        r.xy = T(rows[11][k]), r.yz = T(rows[12][k]), r.xz = T(rows[13][k]);
+        r.sound_speed = T(lane(c, k)), r.spare = T(0);
+        if constexpr (Model::tensile)
+            pass.next_tension[at + k] = make_tension<T>(
+                Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]}, model.artificial_stress.epsilon);
+    }
+
+    // ---- energy: exact sums of rounded addends; extremes; both over the first n lanes
+    const U magic(pass.energy_unit * 6755399441055744.0);
+    const U volume = U(pass.volume) * rho0 * inverse_rho;
+    // viscous power of i's half of its pairs: V_i/2 sum_j V_j rho_i rho_j Pi approach |grad W|/r
+    const U viscous = quantized(half * volume * (-factor) * sum(sums.power) * kick, magic);
+    const U worked = quantized(volume * mapped.work, magic);
+    const U damped = quantized(volume * rho * mu_d * dot(v, v) * kick, magic);
+    const Vec3<U> moved = x - x_sorted.template load<U>(at);
+    const U a2 = dot(a, a), m2 = dot(moved, moved), v2 = dot(v_end, v_end);
+    const U signal = fma(U(pass.h), sqrt(contract(D, D)), c);
+    const U finite = fma(zero, a2, fma(zero, v2, fma(zero, trace(s_end), zero * rho_end)));
+    for (int k = 0; k < n; ++k) {
+        energy.plastic += lane(worked, k);
+        energy.viscous += lane(viscous, k);
+        energy.damping += lane(damped, k);
+        energy.wall += quantized(lane(volume, k) * wall_power[row + k] * pass.kick, lane(magic, k));
+        extremes.acceleration2 = max(lane(a2, k), extremes.acceleration2);
+        extremes.moved2 = max(lane(m2, k), extremes.moved2);
+        extremes.speed2 = max(lane(v2, k), extremes.speed2);
+        extremes.signal = max(lane(signal, k), extremes.signal);
+        if (!(lane(finite, k) == 0)) extremes.bad = 1;
+    }
+    if (pass.low)
+        for (int k = 0; k < n; ++k) {
+            const Vector at_end{lane(x.x, k), lane(x.y, k), lane(x.z, k)};
+            if (at_end.x < pass.low->x || at_end.y < pass.low->y || at_end.z < pass.low->z || at_end.x > pass.high->x ||
+                at_end.y > pass.high->y || at_end.z > pass.high->z)
+                extremes.outside = 1;
+        }
+}
+
+inline void merge(PassResult& a, const PassResult& b)
+{
+    a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
+    a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
+    a.pairs += b.pairs;
+    auto &x = a.extremes;
+    const auto &y = b.extremes;
+    x = {max(y.acceleration2, x.acceleration2), max(y.signal, x.signal), max(y.moved2, x.moved2),
+         max(y.speed2, x.speed2), max(y.bad, x.bad), max(y.outside, x.outside)};
+}
+
+} // namespace pass
+
+/// A model compiled for one number type of the pair sums.
+template <class Model, class V> class Compiled final : public PairModel {
+public:
+    using T = number<V>;
+    explicit Compiled(const Scene& s)
+        : unit_(pass::single<V> ? s.smoothing_length() : 1.0), dimensions_(s.dimensions), model_(Model::from(s, unit_)),
+          // grad W in 1/m^(dimensions + 1) from sums in units of unit_
+          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), place_(s.smoothing_length())
+    {
+    }
+    std::string name() const override;
+    int cluster_width() const override { return width<V>; }
+    scene::Precision precision() const override { return pass::single<V> ? scene::Precision::Mixed : scene::Precision::Double; }
+    bool tensile() const override { return Model::tensile; }
+
+    PassResult run(const Pass<double>& p, std::span<const Index> clusters) const override
+    {
+        if constexpr (pass::single<V>) throw Broken("a mixed-precision model was given double records");
+        else return over(p, clusters);
+    }
+    PassResult run(const Pass<float>& p, std::span<const Index> clusters) const override
+    {
+        if constexpr (pass::single<V>) return over(p, clusters);
+        else throw Broken("a double-precision model was given single-precision records");
+    }
+
+private:
+    PassResult over(const Pass<T>& p, std::span<const Index> clusters) const
+    {
+        PassResult total;
+        const std::int64_t n = std::int64_t(clusters.size());
+#pragma omp parallel
+        {
+            PassResult mine;
+#pragma omp for schedule(dynamic, 32) nowait
+            for (std::int64_t k = 0; k < n; ++k) one_cluster(p, clusters[k], mine);
+#pragma omp critical
+            pass::merge(total, mine);
+        }
+        return total;
+    }
+
+    KUZURE_INLINE void one_cluster(const Pass<T>& p, Index cluster, PassResult& result) const
+    {
+        using U = pass::Update<V>;
+        constexpr int W = width<V>;
+        const auto& store = *p.particles;
+        pass::Here<V> i;
+        i.first = p.lists->first(cluster);
+        i.count = p.lists->count(cluster);
+        i.owned = (1u << i.count) - 1;
+        i.position = pass::positions_of<V>(p.records, i.first);
+        const auto v = store[field::velocity];
+        i.v = {pass::load_narrow<V>(v.column[0] + i.first), pass::load_narrow<V>(v.column[1] + i.first),
+               pass::load_narrow<V>(v.column[2] + i.first)};
+        i.rho = pass::load_narrow<V>(store[field::density].column[0] + i.first);
+        if (p.soils.size() == 1) i.c = V(T(p.soils[0].sound_speed));
+        else {
+            T c[W];
+            for (int k = 0; k < W; ++k) c[k] = p.records[i.first + std::min(k, i.count - 1)].sound_speed;
+            i.c = load<V>(c);
+        }
+        pass::Sums<W, Model::tensile> sums;
+        double wall_power[W] = {};
+        // every particle meets itself once in its list
+        result.pairs += pass::sum_over_soil(model_, i, p.lists->soil(cluster), p.records, p.tension, p.n_records, sums) - i.count;
+        const auto walls = p.lists->walls(cluster);
+        if (!walls.empty()) result.pairs += pass::sum_over_walls(model_, i, p, walls, unit_, dimensions_, scale_, sums, wall_power);
+        for (int row = 0; row < i.count; row += width<U>)
+            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, place_,
+                             result.energy, result.extremes);
+    }
+
+    double unit_;
+    int dimensions_;
+    Model model_;
+    double scale_;
+    Places<T> place_;
+};
+
+template <class Model, class V> std::string Compiled<Model, V>::name() const
+{
+    using K = typename Model::Kernel;
+    std::string s = std::is_same_v<K, CubicSpline> ? "cubic spline" : std::is_same_v<K, WendlandC2> ? "wendland c2" : "wendland c4";
+    if (Model::viscous) s += " + viscosity";
+    if (Model::tensile) s += " + artificial stress";
+    return s + (pass::single<V> ? ", mixed" : ", double") + (width<V> > 1 ? " x " + std::to_string(width<V>) : ", plain");
+}
+
+} // namespace kuzure

@@ -1,0 +1,19 @@
+// Compiled once per entry of Variants, with -DVARIANT=0, 1, 2, ...
+#include "solver/kernels/pass_impl.hpp"
+#include "solver/kernels/variants.hpp"
+
+namespace kuzure {
+
+template <int I> std::unique_ptr<PairModel> make_variant(const Scene&, Arithmetic);
+
+template <> std::unique_ptr<PairModel> make_variant<VARIANT>(const Scene& s, Arithmetic a)
+{
+    using M = std::tuple_element_t<VARIANT, Variants>;
+    const bool mixed = s.accuracy.precision == scene::Precision::Mixed;
+    if (a == Arithmetic::Plain && mixed) return std::make_unique<Compiled<M, float>>(s);
+    if (a == Arithmetic::Plain) return std::make_unique<Compiled<M, double>>(s);
+    if (mixed) return std::make_unique<Compiled<M, Native<float>>>(s);
+    return std::make_unique<Compiled<M, Native<double>>>(s);
+}
+
+} // namespace kuzure

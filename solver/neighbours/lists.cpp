@@ -1,0 +1,263 @@
+#include "solver/neighbours/lists.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <omp.h>
+
+namespace kuzure {
+
+void WallPoints::sort(const Columns& c)
+{
+    columns = sort_into_columns(c, x.data(), y.data(), z.data(), id.data(), Index(x.size()));
+    const auto permute = [&](auto& v) {
+        std::remove_reference_t<decltype(v)> w(v.size());
+        for (std::size_t k = 0; k < v.size(); ++k) w[k] = v[columns.order[k]];
+        v.swap(w);
+    };
+    permute(x), permute(y), permute(z), permute(id);
+}
+
+namespace {
+
+using Narrow = Native<float>;
+constexpr int narrow = width<Narrow>;
+
+/// Candidates in single precision, relative to a local origin, padded so that a full register may be read anywhere.
+struct Candidates {
+    Array<float> x, y, z;
+    Array<Index> record;
+    std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;
+    std::vector<Index> start;
+
+    void resize(Index n)
+    {
+        x.resize(n + narrow), y.resize(n + narrow), z.resize(n + narrow), record.resize(n + narrow);
+        for (Index k = n; k < n + narrow; ++k) x[k] = y[k] = z[k] = 1e30f, record[k] = 0;
+    }
+    std::pair<Index, Index> range(std::int32_t cx, std::int32_t cy) const
+    {
+        const std::int32_t a = cx - x0, b = cy - y0;
+        if (a < 0 || b < 0 || a >= nx || b >= ny) return {0, 0};
+        const std::size_t c = std::size_t(b) * nx + a;
+        return {start[c], start[c + 1]};
+    }
+};
+
+/// Two sets in the global order become one; the second set's records follow the first's.
+Candidates merge(const SortedPoints& a, const SortedPoints& b, Vector origin)
+{
+    Candidates m;
+    const auto &ca = *a.columns, &cb = *b.columns;
+    const bool one = b.n == 0, other = a.n == 0;
+    m.x0 = one ? ca.x0 : other ? cb.x0 : std::min(ca.x0, cb.x0);
+    m.y0 = one ? ca.y0 : other ? cb.y0 : std::min(ca.y0, cb.y0);
+    const auto x1 = one ? ca.x0 + ca.nx : other ? cb.x0 + cb.nx : std::max(ca.x0 + ca.nx, cb.x0 + cb.nx);
+    const auto y1 = one ? ca.y0 + ca.ny : other ? cb.y0 + cb.ny : std::max(ca.y0 + ca.ny, cb.y0 + cb.ny);
+    m.nx = x1 - m.x0, m.ny = y1 - m.y0;
+    const std::size_t count = std::size_t(m.nx) * m.ny;
+    m.start.resize(count + 1);
+    m.start[0] = 0;
+    for (std::size_t c = 0; c < count; ++c) {
+        const auto cx = m.x0 + std::int32_t(c % m.nx), cy = m.y0 + std::int32_t(c / m.nx);
+        const auto ra = ca.range(cx, cy), rb = cb.range(cx, cy);
+        m.start[c + 1] = m.start[c] + (ra.second - ra.first) + (rb.second - rb.first);
+    }
+    m.resize(a.n + b.n);
+    const auto put = [&](Index at, const SortedPoints& s, Index from, Index record) {
+        m.x[at] = float(s.x[from] - origin.x), m.y[at] = float(s.y[from] - origin.y), m.z[at] = float(s.z[from] - origin.z);
+        m.record[at] = record;
+    };
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::int64_t c = 0; c < std::int64_t(count); ++c) {
+        const auto cx = m.x0 + std::int32_t(c % m.nx), cy = m.y0 + std::int32_t(c / m.nx);
+        auto [i, i_end] = ca.range(cx, cy);
+        auto [j, j_end] = cb.range(cx, cy);
+        for (Index at = m.start[c]; at < m.start[c + 1]; ++at) {
+            const bool first = j == j_end ||
+                               (i < i_end && (a.z[i] < b.z[j] || (a.z[i] == b.z[j] && a.id[i] < b.id[j])));
+            if (first) put(at, a, i, i), ++i;
+            else put(at, b, j, a.n + j), ++j;
+        }
+    }
+    return m;
+}
+
+Candidates of_walls(const WallPoints& w, Vector origin)
+{
+    Candidates m;
+    m.x0 = w.columns.x0, m.y0 = w.columns.y0, m.nx = w.columns.nx, m.ny = w.columns.ny;
+    m.start = w.columns.start;
+    const Index n = Index(w.x.size());
+    m.resize(n);
+    for (Index k = 0; k < n; ++k) {
+        m.x[k] = float(w.x[k] - origin.x), m.y[k] = float(w.y[k] - origin.y), m.z[k] = float(w.z[k] - origin.z);
+        m.record[k] = k;
+    }
+    return m;
+}
+
+/// One cluster's particles, in single precision.
+struct Cluster {
+    int n;
+    float x[16], y[16], z[16];
+    float lo[3], hi[3];
+};
+
+/// Appends the candidates within reach of any particle of the cluster, in the global order. `out` must have room for
+/// `room` more; returns the new count.
+template <class Grow>
+std::size_t find(const Candidates& m, const Columns& columns, const Cluster& c, std::int32_t cx0, std::int32_t cx1, std::int32_t cy0,
+                 std::int32_t cy1, Vector origin, float reach, Array<Index>& out, std::size_t used, Grow grow)
+{
+    const float reach2 = reach * reach;
+    Narrow px[16], py[16], pz[16];
+    for (int k = 0; k < c.n; ++k) px[k] = Narrow(c.x[k]), py[k] = Narrow(c.y[k]), pz[k] = Narrow(c.z[k]);
+    for (std::int32_t cy = cy0; cy <= cy1; ++cy)
+        for (std::int32_t cx = cx0; cx <= cx1; ++cx) {
+            auto [begin, end] = m.range(cx, cy);
+            if (begin == end) continue;
+            // distance of the cluster's box to the column, in plan
+            const float left = float(columns.origin.x + cx * columns.width_x - origin.x), right = left + float(columns.width_x);
+            const float dx = std::max({0.f, left - c.hi[0], c.lo[0] - right});
+            float dy = 0;
+            if (!columns.flat) {
+                const float front = float(columns.origin.y + cy * columns.width_y - origin.y),
+                            back = front + float(columns.width_y);
+                dy = std::max({0.f, front - c.hi[1], c.lo[1] - back});
+            }
+            // left and front carry single-precision rounding: reach has the slack for it
+            const float rest = reach2 - dx * dx - dy * dy;
+            if (rest <= 0) continue;
+            const float dz = std::sqrt(rest);
+            const float* z = m.z.data();
+            begin = Index(std::lower_bound(z + begin, z + end, c.lo[2] - dz) - z);
+            end = Index(std::upper_bound(z + begin, z + end, c.hi[2] + dz) - z);
+            if (out.size() < used + std::size_t(end - begin) + narrow) grow(used + std::size_t(end - begin) + narrow);
+            Index* to = out.data();
+            for (Index q = begin; q < end; q += narrow) {
+                const Narrow x = load<Narrow>(&m.x[q]), y = load<Narrow>(&m.y[q]), zz = load<Narrow>(&m.z[q]);
+                Narrow nearest(1e30f);
+                for (int k = 0; k < c.n; ++k) {
+                    const Narrow a = x - px[k], b = y - py[k], d = zz - pz[k];
+                    nearest = min(fma(d, d, fma(b, b, a * a)), nearest);
+                }
+                unsigned hits = bits(less(nearest, Narrow(reach2)));
+                if (end - q < narrow) hits &= (1u << (end - q)) - 1;
+                for (; hits; hits &= hits - 1) to[used++] = m.record[q + std::countr_zero(hits)];
+            }
+        }
+    return used;
+}
+
+} // namespace
+
+void ClusterLists::build(const Columns& columns, const SortedPoints& owned, const SortedPoints& ghosts,
+                         std::span<const WallPoints> walls, double reach, int width)
+{
+    ensure(width >= 1 && width <= 16, "a cluster holds 1 to 16 particles");
+    width_ = width;
+    // ---- clusters: runs of `width` in each column
+    const auto& cols = *owned.columns;
+    const std::size_t n_columns = std::size_t(cols.nx) * cols.ny;
+    std::vector<Index> cluster_start(n_columns + 1, 0);
+    for (std::size_t c = 0; c < n_columns; ++c)
+        cluster_start[c + 1] = cluster_start[c] + (cols.start[c + 1] - cols.start[c] + width - 1) / width;
+    const Index n = n_columns ? cluster_start[n_columns] : 0;
+    first_.resize(n), count_.resize(n), soil_.resize(n), walls_.resize(n), n_soil_.resize(n), n_walls_.resize(n);
+
+    // ---- single-precision coordinates relative to the middle of the owned soil, with slack for their rounding
+    Vector lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+    for (Index i = 0; i < owned.n; ++i) {
+        lo = {std::min(lo.x, owned.x[i]), std::min(lo.y, owned.y[i]), std::min(lo.z, owned.z[i])};
+        hi = {std::max(hi.x, owned.x[i]), std::max(hi.y, owned.y[i]), std::max(hi.z, owned.z[i])};
+    }
+    const Vector origin = owned.n ? 0.5 * (lo + hi) : Vector{};
+    const double extent = owned.n ? std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) + 4 * reach : 0;
+    const float slack_reach = float(reach * (1 + 1e-6) + 1e-6 * extent);
+    const Candidates soil = merge(owned, ghosts, origin);
+    std::vector<Candidates> wall_points;
+    for (const auto& w : walls) wall_points.push_back(of_walls(w, origin));
+
+    const int threads = omp_get_max_threads();
+    soil_store_.resize(threads), wall_store_.resize(threads);
+    struct Place {
+        int thread;
+        std::size_t soil, walls;
+    };
+    Array<Place> place(n);
+    std::vector<std::uint8_t> has_ghost(n, 0);
+    std::size_t entries = 0, wall_entries = 0;
+    const auto column_reach = [&](double w) { return std::int32_t(std::ceil(slack_reach / w)); };
+    const std::int32_t rx = column_reach(columns.width_x), ry = columns.flat ? 0 : column_reach(columns.width_y);
+
+#pragma omp parallel num_threads(threads) reduction(+ : entries, wall_entries)
+    {
+        const int t = omp_get_thread_num();
+        auto &out = soil_store_[t], &wall_out = wall_store_[t];
+        std::size_t used = 0, wall_used = 0;
+        const auto grower = [](Array<Index>& a) {
+            return [&a](std::size_t need) { a.resize(std::max(need, a.size() + a.size() / 2 + 4096)); };
+        };
+#pragma omp for schedule(dynamic, 16)
+        for (std::int64_t column = 0; column < std::int64_t(n_columns); ++column) {
+            const std::int32_t cx = cols.x0 + std::int32_t(column % cols.nx), cy = cols.y0 + std::int32_t(column / cols.nx);
+            Index begin = cols.start[column];
+            const Index end = cols.start[column + 1];
+            for (Index c = cluster_start[column]; c < cluster_start[column + 1]; ++c, begin += width) {
+                Cluster cl;
+                cl.n = std::min<Index>(width, end - begin);
+                for (int d = 0; d < 3; ++d) cl.lo[d] = 1e30f, cl.hi[d] = -1e30f;
+                for (int k = 0; k < cl.n; ++k) {
+                    const float p[3] = {float(owned.x[begin + k] - origin.x), float(owned.y[begin + k] - origin.y),
+                                        float(owned.z[begin + k] - origin.z)};
+                    cl.x[k] = p[0], cl.y[k] = p[1], cl.z[k] = p[2];
+                    for (int d = 0; d < 3; ++d) cl.lo[d] = std::min(cl.lo[d], p[d]), cl.hi[d] = std::max(cl.hi[d], p[d]);
+                }
+                first_[c] = begin, count_[c] = std::int8_t(cl.n);
+                place[c] = {t, used, wall_used};
+                const std::size_t before = used;
+                used = find(soil, columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach, out, used, grower(out));
+                n_soil_[c] = Index(used - before);
+                for (std::size_t k = before; k < used; ++k)
+                    if (out[k] >= owned.n) {
+                        has_ghost[c] = 1;
+                        break;
+                    }
+                const std::size_t wall_before = wall_used;
+                for (std::size_t w = 0; w < walls.size(); ++w) {
+                    if (wall_out.size() < wall_used + 2) grower(wall_out)(wall_used + 2);
+                    const std::size_t head = wall_used;
+                    wall_used = find(wall_points[w], columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach,
+                                     wall_out, wall_used + 2, grower(wall_out));
+                    const std::size_t found = wall_used - head - 2;
+                    if (found == 0) {
+                        wall_used = head;
+                        continue;
+                    }
+                    wall_out[head] = Index(w), wall_out[head + 1] = Index(found);
+                    wall_entries += found;
+                }
+                n_walls_[c] = Index(wall_used - wall_before);
+            }
+        }
+        entries += used;
+    }
+    entries_ = entries, wall_entries_ = wall_entries;
+    interior_.clear(), rim_.clear();
+    for (Index c = 0; c < n; ++c) {
+        soil_[c] = soil_store_[place[c].thread].data() + place[c].soil;
+        walls_[c] = wall_store_[place[c].thread].data() + place[c].walls;
+        (has_ghost[c] ? rim_ : interior_).push_back(c);
+    }
+}
+
+std::size_t ClusterLists::bytes() const
+{
+    std::size_t b = first_.capacity() * (sizeof(Index) * 3 + 1 + 2 * sizeof(void*));
+    for (const auto& s : soil_store_) b += s.capacity() * sizeof(Index);
+    for (const auto& s : wall_store_) b += s.capacity() * sizeof(Index);
+    return b + (interior_.capacity() + rim_.capacity()) * sizeof(Index);
+}
+
+} // namespace kuzure

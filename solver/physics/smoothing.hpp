@@ -1,0 +1,78 @@
+#pragma once
+// Smoothing kernels W(r, h) with support 2h. Legend: q = r/h, t = 2h - r where positive, else 0.
+// A kernel gives shape(t, r, 1/r) with
+//
+//     grad_i W_ij = scale * shape * (x_i - x_j)
+//
+// so that the constant is taken out of the sums. shape is exactly zero beyond the support.
+#include "solver/core/simd.hpp"
+#include <numbers>
+
+namespace kuzure {
+
+/// Cubic B-spline (Monaghan & Lattanzio 1985): W = A (1 - 3/2 q^2 + 3/4 q^3) for q < 1, A/4 (2 - q)^3 for q < 2.
+struct CubicSpline {
+    double h, a;
+    double scale;
+    CubicSpline(double h, int dimensions)
+        : h(h), a(dimensions == 3 ? 1 / (std::numbers::pi * h * h * h) : 10 / (7 * std::numbers::pi * h * h)),
+          scale(-0.75 * a / (h * h * h))
+    {
+    }
+    // dW/dr = -3/4 A/h [ (2 - q)+^2 - 4 (1 - q)+^2 ]
+    template <class V> KUZURE_INLINE V shape(V t, V, V inverse_r) const
+    {
+        const V u = max(fma(t, V(2), V(number<V>(-2 * h))), V(0)); // 2 h (1 - q)+
+        return fnma(u, u, t * t) * inverse_r;
+    }
+    /// W(r), 1/m^3 (1/m^2 in 2-D).
+    template <class V> KUZURE_INLINE V value(V t) const
+    {
+        const V u = max(t - V(number<V>(h)), V(0)); // h (1 - q)+
+        return V(number<V>(0.25 * a / (h * h * h))) * fnma(V(4) * u, u * u, t * t * t);
+    }
+};
+
+/// Wendland C2 (Wendland 1995): W = A (1 - q/2)^4 (2 q + 1).
+struct WendlandC2 {
+    double h, a;
+    double scale;
+    WendlandC2(double h, int dimensions)
+        : h(h), a(dimensions == 3 ? 21 / (16 * std::numbers::pi * h * h * h) : 7 / (4 * std::numbers::pi * h * h)),
+          scale(-5 * a / (8 * h * h * h * h * h))
+    {
+    }
+    // (dW/dr)/r = -5 A/h^2 (1 - q/2)^3
+    template <class V> KUZURE_INLINE V shape(V t, V, V) const { return t * t * t; }
+    /// W(r), 1/m^3 (1/m^2 in 2-D).
+    template <class V> KUZURE_INLINE V value(V t) const
+    {
+        const V f = t * V(number<V>(0.5 / h)), f2 = f * f;
+        return V(number<V>(a)) * (f2 * f2) * fnma(V(4), f, V(5));
+    }
+};
+
+/// Wendland C4 (Wendland 1995): W = A (1 - q/2)^6 (35/12 q^2 + 3 q + 1).
+struct WendlandC4 {
+    double h, a;
+    double scale;
+    WendlandC4(double h, int dimensions)
+        : h(h), a(dimensions == 3 ? 495 / (256 * std::numbers::pi * h * h * h) : 9 / (4 * std::numbers::pi * h * h)),
+          scale(-14.0 / 3 * a / (32 * h * h * h * h * h * h * h))
+    {
+    }
+    // (dW/dr)/r = -14/3 A/h^2 (1 - q/2)^5 (1 + 5/2 q)
+    template <class V> KUZURE_INLINE V shape(V t, V r, V) const
+    {
+        const V t2 = t * t;
+        return t2 * t2 * t * fma(r, V(number<V>(2.5 / h)), V(1));
+    }
+    /// W(r), 1/m^3 (1/m^2 in 2-D).
+    template <class V> KUZURE_INLINE V value(V t) const
+    {
+        const V f = t * V(number<V>(0.5 / h)), q = fnma(f, V(2), V(2)), f2 = f * f;
+        return V(number<V>(a)) * (f2 * f2 * f2) * fma(q, fma(q, V(number<V>(35.0 / 12)), V(3)), V(1));
+    }
+};
+
+} // namespace kuzure

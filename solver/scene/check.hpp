@@ -1,0 +1,34 @@
+#pragma once
+// The rules a scene must obey beyond the type and range of each key, and the choice of effects it leaves to
+// us.
+#include "solver/scene/fill.hpp"
+#include "solver/scene/issue.hpp"
+#include "solver/scene/scene.hpp"
+
+namespace kuzure::scene
+{
+
+/// Largest dt c_p/h that the leap-frog survives; above it a run is refused unless the user insists.
+inline constexpr double unstable_courant = 0.8;
+/// Largest dt c_p/h that leaves the margin which impacts and disorder need; above it a warning is given.
+inline constexpr double recommended_courant = 0.4;
+
+/// min over soils of h/c_p (s): a Courant number of one.
+double crossing_time(const Scene&);
+/// Fixed steps (s) up to here are stable with margin, and up to there stable at all.
+double recommended_step(const Scene&);
+double stable_step(const Scene&);
+
+/// What a step above the stable limit is: an error, or a warning for --force-step.
+enum class StepLimit { Enforce, Force };
+
+/// Decides what the file leaves to "auto" and rewrites scene.notes: one line for every effect, on or off, and
+/// why.
+void resolve(Scene&);
+/// Every rule a resolved scene breaks: errors and warnings, filling included.
+Issues check(const Scene&, StepLimit = StepLimit::Enforce);
+
+/// Bytes of the columns of all soil particles of a run: the fields of the store, without records and lists.
+double column_bytes(const Filling&);
+
+} // namespace kuzure::scene

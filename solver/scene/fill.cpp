@@ -1,0 +1,464 @@
+#include "solver/scene/fill.hpp"
+#include "solver/core/ensure.hpp"
+#include <fmt/format.h>
+
+namespace kuzure::scene
+{
+namespace
+{
+
+/// A box's side must hold whole spacings within this share of one; two boxes may overlap by as much.
+const double tolerance = 1e-6;
+/// A lattice point this close to a surface, in spacings, lies on it and so not strictly inside.
+const double on_the_surface = 1e-9;
+/// More points, or more rows to be stored, than this mean a spacing that is not meant.
+const double most_points = 1e11, most_rows = 2e7;
+
+double at(const Vector& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+Box united(const Box& a, const Box& b)
+{
+    return {{std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)},
+            {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
+}
+
+/// Side of the thinnest common part of two boxes along the axes that count; negative if they are apart.
+double common(const Box& a, const Box& b, int dimensions)
+{
+    double least = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis)
+        if (axis != 1 || dimensions == 3)
+            least = std::min(least, std::min(at(a.high, axis), at(b.high, axis)) -
+                                        std::max(at(a.low, axis), at(b.low, axis)));
+    return least;
+}
+
+/// Part of a row along x.
+struct Zone {
+    double from, to;
+};
+
+/// Depth (m) of a row along x below the faces that the row runs along: those of a box in y and z, the ends of
+/// a cylinder, the sides of a polygon. Negative outside.
+double depth_between_faces(const Shape& shape, double y, double z, int dimensions)
+{
+    const auto depth = [](double x, double low, double high) { return std::min(x - low, high - x); };
+    const double none = std::numeric_limits<double>::infinity();
+    if (const auto* b = std::get_if<Box>(&shape))
+        return std::min(depth(z, b->low.z, b->high.z),
+                        dimensions == 2 ? none : depth(y, b->low.y, b->high.y));
+    if (const auto* c = std::get_if<Cylinder>(&shape))
+        return depth(z, c->base.z, c->base.z + c->height);
+    if (const auto* p = std::get_if<Polygon>(&shape); p && dimensions == 3)
+        return depth(y, p->y[0], p->y[1]);
+    return none;
+}
+
+/// The parts of a row along x that come nearer than margin to the surface, faces along the row not counted,
+/// from left to right. Between them a row is all inside or all outside.
+std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, double margin, int dimensions)
+{
+    std::vector<Zone> zones;
+    const auto round = [&](double centre, double across2, double radius) {
+        const double inner = std::max(radius - margin, 0.0), outer = radius + margin;
+        if (across2 > outer * outer)
+            return;
+        const double from = std::sqrt(std::max(inner * inner - across2, 0.0)),
+                     to = std::sqrt(outer * outer - across2);
+        zones = {{centre - to, centre - from}, {centre + from, centre + to}};
+    };
+    if (const auto* b = std::get_if<Box>(&shape)) {
+        zones = {{b->low.x - margin, b->low.x + margin}, {b->high.x - margin, b->high.x + margin}};
+    } else if (const auto* c = std::get_if<Cylinder>(&shape)) {
+        round(c->base.x, (y - c->base.y) * (y - c->base.y), c->radius);
+    } else if (const auto* s = std::get_if<Sphere>(&shape)) {
+        const double dy = dimensions == 2 ? 0 : y - s->center.y, dz = z - s->center.z;
+        round(s->center.x, dy * dy + dz * dz, s->radius);
+    } else {
+        const auto& points = std::get<Polygon>(shape).points;
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            const auto [ax, az] = points[k];
+            const auto [bx, bz] = points[(k + 1) % points.size()];
+            if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin)
+                continue;
+            // The part of the edge within margin of the row's height.
+            const auto x_at = [&](double height) {
+                return az == bz ? height < z ? ax : bx
+                                : ax + std::clamp((height - az) / (bz - az), 0.0, 1.0) * (bx - ax);
+            };
+            const double x1 = x_at(z - margin), x2 = x_at(z + margin);
+            zones.push_back({std::min(x1, x2) - margin, std::max(x1, x2) + margin});
+        }
+        std::sort(zones.begin(), zones.end(), [](const Zone& a, const Zone& b) { return a.from < b.from; });
+    }
+    return zones;
+}
+
+} // namespace
+
+/// Cuts indices along x into runs that lie all inside or all outside: single points within the zones and at
+/// their rims, whole stretches between them. Calls visit(first, last), inclusive.
+template <class Zones, class Visit> void Lattice::for_each_run(Range r, const Zones& zones, Visit visit) const
+{
+    std::int64_t next = r.first;
+    const auto stretch = [&](std::int64_t last) {
+        if (next <= last)
+            visit(next, last);
+        next = std::max(next, last + 1);
+    };
+    const auto index = [&](double x) {
+        return std::int64_t(std::clamp(std::floor((x - x_.origin) / spacing_ - 0.5), double(r.first) - 2,
+                                       double(r.last) + 2));
+    };
+    for (const auto& zone : zones) {
+        if (next > r.last)
+            return;
+        stretch(std::min(index(zone.from) - 1, r.last));
+        const std::int64_t end = std::min(index(zone.to) + 2, r.last);
+        while (next <= end)
+            visit(next, next), ++next;
+    }
+    stretch(r.last);
+}
+
+std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
+{
+    const Box outer = scene::bounds(shape);
+    double points = 1, rows = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (axis == 1 && dimensions == 2)
+            continue;
+        const double low = at(outer.low, axis), high = at(outer.high, axis), n = (high - low) / spacing;
+        const char name = "xyz"[axis];
+        if (!(high > low))
+            return fmt::format("expected low < high along {}, found {} and {}", name, low, high);
+        if (std::holds_alternative<Box>(shape) && std::abs(n - std::round(n)) > tolerance) {
+            const double less = low + std::floor(n) * spacing, more = low + std::ceil(n) * spacing;
+            return fmt::format("expected a whole number of spacings ({} m) a side, found {:.9g} along {}; "
+                               "let high.{} be {}{:.9g}",
+                               spacing, n, name, name, n > 1 ? fmt::format("{:.9g} or ", less) : "", more);
+        }
+        points *= n;
+        if (axis > 0)
+            rows *= n;
+    }
+    if (points > most_points || (!std::holds_alternative<Box>(shape) && rows > most_rows))
+        return fmt::format(
+            "expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
+            "is space.spacing in metres?",
+            points, spacing);
+    return {};
+}
+
+Lattice::Lattice(const Shape& shape, double spacing, int dimensions)
+    : dimensions_(dimensions), spacing_(spacing)
+{
+    ensure(problem(shape, spacing, dimensions).empty(), "a shape is filled that cannot be");
+    const Box outer = scene::bounds(shape);
+    if (std::holds_alternative<Box>(shape)) {
+        const auto side = [&](double low, double high) {
+            return Axis{low, {0, std::int64_t(std::llround((high - low) / spacing)) - 1}};
+        };
+        x_ = side(outer.low.x, outer.high.x), z_ = side(outer.low.z, outer.high.z);
+        if (dimensions == 3)
+            y_ = side(outer.low.y, outer.high.y);
+        row_start_ = {0, 1};
+        intervals_ = {{0, x_.range.last, 0}};
+        layer_id_ = {0, count(y_.range) * count(x_.range)};
+    } else {
+        const auto side = [&](double low, double high) {
+            return Axis{0,
+                        {std::int64_t(std::floor(low / spacing - 0.5)),
+                         std::int64_t(std::ceil(high / spacing - 0.5))}};
+        };
+        x_ = side(outer.low.x, outer.high.x), z_ = side(outer.low.z, outer.high.z);
+        if (dimensions == 3)
+            y_ = side(outer.low.y, outer.high.y);
+        const auto inside = [&](std::int64_t kx, std::int64_t ky, std::int64_t kz) {
+            const Vector x{coordinate(x_, kx), y_of(ky), coordinate(z_, kz)};
+            return signed_distance(shape, x, dimensions) < -on_the_surface * spacing;
+        };
+        const auto trim = [&](Axis& axis, auto any) {
+            while (axis.range.first <= axis.range.last && !any(axis.range.first))
+                ++axis.range.first;
+            while (axis.range.first <= axis.range.last && !any(axis.range.last))
+                --axis.range.last;
+        };
+        // Along the axis of extrusion the first and last layers may lie outside: cut them off, then rows
+        // repeat.
+        if (const auto* c = std::get_if<Cylinder>(&shape)) {
+            trim(z_, [&](auto k) {
+                const double z = coordinate(z_, k), margin = on_the_surface * spacing;
+                return z > c->base.z + margin && z < c->base.z + c->height - margin;
+            });
+            stride_y_ = 1;
+        } else if (const auto* p = std::get_if<Polygon>(&shape)) {
+            if (dimensions == 3)
+                trim(y_, [&](auto k) {
+                    const double y = y_of(k), margin = on_the_surface * spacing;
+                    return y > p->y[0] + margin && y < p->y[1] - margin;
+                });
+            stride_z_ = 1;
+        } else {
+            stride_z_ = count(y_.range), stride_y_ = 1;
+        }
+        if (count(z_.range) <= 0 || count(y_.range) <= 0)
+            z_.range.last = z_.range.first - 1;
+
+        const std::int64_t stored_z =
+            stride_z_ ? count(z_.range) : std::min<std::int64_t>(count(z_.range), 1);
+        const std::int64_t stored_y = stride_y_ ? count(y_.range) : 1;
+        row_start_ = {0};
+        layer_id_ = {0};
+        for (std::int64_t iz = 0; iz < stored_z; ++iz) {
+            std::int64_t in_layer = 0;
+            for (std::int64_t iy = 0; iy < stored_y; ++iy) {
+                if (stride_y_)
+                    row_id_.push_back(in_layer);
+                const std::int64_t kz = z_.range.first + iz, ky = y_.range.first + iy;
+                std::int64_t in_row = 0;
+                const auto zones =
+                    zones_near_surface(shape, y_of(ky), coordinate(z_, kz), tolerance * spacing, dimensions);
+                for_each_run(x_.range, zones, [&](std::int64_t first, std::int64_t last) {
+                    if (!inside(first, ky, kz))
+                        return;
+                    if (in_row > 0 && intervals_.back().last == first - 1)
+                        intervals_.back().last = last;
+                    else
+                        intervals_.push_back({first, last, in_row});
+                    in_row += last - first + 1;
+                });
+                row_start_.push_back(intervals_.size());
+                in_layer += stride_y_ ? in_row : in_row * count(y_.range);
+            }
+            layer_id_.push_back(layer_id_.back() + in_layer);
+        }
+    }
+    size_ = stride_z_ ? layer_id_.back() : count(z_.range) > 0 ? count(z_.range) * layer_id_[1] : 0;
+
+    if (size_ == 0)
+        return;
+    const double far = std::numeric_limits<double>::infinity();
+    bounds_ = {{far, far, far}, {-far, -far, -far}};
+    const std::int64_t stored_z = std::int64_t(layer_id_.size()) - 1,
+                       stored_y = stride_y_ ? count(y_.range) : 1;
+    for (std::int64_t iz = 0; iz < stored_z; ++iz)
+        for (std::int64_t iy = 0; iy < stored_y; ++iy) {
+            const std::int64_t kz = z_.range.first + iz, ky = y_.range.first + iy;
+            const auto in = row(kz, ky).intervals;
+            if (in.empty())
+                continue;
+            const std::int64_t top = stride_z_ ? kz : z_.range.last, back = stride_y_ ? ky : y_.range.last;
+            bounds_ = united(bounds_, {{coordinate(x_, in.front().first), y_of(ky), coordinate(z_, kz)},
+                                       {coordinate(x_, in.back().last), y_of(back), coordinate(z_, top)}});
+        }
+}
+
+Lattice::Range Lattice::within(const Axis& a, double low, double high) const
+{
+    // Estimate in numbers that fit, then let the coordinates themselves decide.
+    const double first = double(a.range.first), last = double(a.range.last);
+    Range r{std::int64_t(std::clamp(std::ceil((low - a.origin) / spacing_ - 0.5), first, last + 1)),
+            std::int64_t(std::clamp(std::floor((high - a.origin) / spacing_ - 0.5), first - 1, last))};
+    while (r.first > a.range.first && coordinate(a, r.first - 1) >= low)
+        --r.first;
+    while (r.first <= a.range.last && coordinate(a, r.first) < low)
+        ++r.first;
+    while (r.last < a.range.last && coordinate(a, r.last + 1) <= high)
+        ++r.last;
+    while (r.last >= a.range.first && coordinate(a, r.last) > high)
+        --r.last;
+    return r;
+}
+
+Vector Lattice::position(std::int64_t local) const
+{
+    ensure(local >= 0 && local < size_, "a lattice point is asked for that does not exist");
+    std::int64_t iz, rest, iy = 0;
+    if (stride_z_) {
+        iz = std::upper_bound(layer_id_.begin(), layer_id_.end(), local) - layer_id_.begin() - 1;
+        rest = local - layer_id_[std::size_t(iz)];
+    } else {
+        iz = local / layer_id_[1];
+        rest = local % layer_id_[1];
+    }
+    const std::int64_t kz = z_.range.first + iz;
+    if (stride_y_) {
+        const auto begin = row_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0),
+                   end = begin + count(y_.range);
+        iy = std::upper_bound(begin, end, rest) - begin - 1;
+        rest -= begin[iy];
+    } else {
+        const std::int64_t n = row(kz, y_.range.first).size;
+        iy = rest / n;
+        rest %= n;
+    }
+    const std::int64_t ky = y_.range.first + iy;
+    const auto in = row(kz, ky).intervals;
+    auto here = in.begin();
+    while (rest > here->before + here->last - here->first)
+        ++here;
+    return {coordinate(x_, here->first + rest - here->before), y_of(ky), coordinate(z_, kz)};
+}
+
+std::int64_t Lattice::count_in(const Box& region) const
+{
+    const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
+    const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
+    if (size_ == 0 || count(zs) <= 0 || count(ys) <= 0)
+        return 0;
+    std::int64_t sum = 0;
+    for (std::int64_t kz = zs.first; kz <= (stride_z_ ? zs.last : zs.first); ++kz)
+        for (std::int64_t ky = ys.first; ky <= (stride_y_ ? ys.last : ys.first); ++ky)
+            for (const Interval& in : row(kz, ky).intervals)
+                sum +=
+                    std::max<std::int64_t>(0, std::min(in.last, xs.last) - std::max(in.first, xs.first) + 1);
+    return sum * (stride_z_ ? 1 : count(zs)) * (stride_y_ ? 1 : count(ys));
+}
+
+bool Lattice::reaches_into(const Shape& other) const
+{
+    const Box region = scene::bounds(other);
+    const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
+    const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
+    if (size_ == 0)
+        return false;
+    for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
+        for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
+            const double y = y_of(ky), z = coordinate(z_, kz), depth = tolerance * spacing_;
+            const auto in = row(kz, ky).intervals;
+            if (in.empty() || depth_between_faces(other, y, z, dimensions_) <= depth)
+                continue;
+            const auto zones = zones_near_surface(other, y, z, 2 * depth, dimensions_);
+            bool found = false;
+            for (const Interval& i : in)
+                for_each_run({std::max(i.first, xs.first), std::min(i.last, xs.last)}, zones,
+                             [&](std::int64_t first, std::int64_t) {
+                                 found = found || signed_distance(other, {coordinate(x_, first), y, z},
+                                                                  dimensions_) < -depth;
+                             });
+            if (found)
+                return true;
+        }
+    return false;
+}
+
+Issues Filling::problems(const Scene& scene)
+{
+    struct Piece {
+        std::string key;
+        const Shape* shape;
+        std::optional<Lattice> lattice;
+    };
+    std::vector<Piece> pieces;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+        pieces.push_back({fmt::format("body.{}", b), &scene.bodies[b].shape, {}});
+    for (std::size_t w = 0; w < scene.walls.size(); ++w)
+        pieces.push_back({fmt::format("wall.{}", w), &scene.walls[w].shape, {}});
+
+    Issues issues;
+    const int dimensions = scene.dimensions;
+    for (auto& p : pieces) {
+        const std::string key = p.key + "." + name_of(*p.shape);
+        if (auto text = Lattice::problem(*p.shape, scene.space.spacing, dimensions); !text.empty()) {
+            issues.push_back({Severity::Error, key, std::move(text), {}});
+            continue;
+        }
+        p.lattice.emplace(*p.shape, scene.space.spacing, dimensions);
+        if (p.lattice->size() == 0)
+            issues.push_back(
+                {Severity::Error,
+                 key,
+                 fmt::format("expected particles strictly inside, found none at a spacing of {} m; make "
+                             "the shape larger or space.spacing smaller",
+                             scene.space.spacing),
+                 {}});
+    }
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
+            const auto &a = pieces[i], &b = pieces[j];
+            if (!a.lattice || !b.lattice)
+                continue;
+            const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);
+            if (depth <= tolerance * scene.space.spacing)
+                continue;
+            const bool boxes = std::holds_alternative<Box>(*a.shape) && std::holds_alternative<Box>(*b.shape);
+            // Points of one shape outside another are half a spacing from a box's points, and shapes other
+            // than boxes share one lattice: no points strictly inside means no points too close.
+            if (boxes || a.lattice->reaches_into(*b.shape) || b.lattice->reaches_into(*a.shape))
+                issues.push_back(
+                    {Severity::Error, b.key,
+                     fmt::format("expected shapes that at most touch, found an overlap of {} with {}{}; "
+                                 "move or cut one of them",
+                                 b.key, a.key, boxes ? fmt::format(" by {:.6g} m", depth) : ""),
+                     a.key});
+        }
+    return issues;
+}
+
+Filling::Filling(const Scene& scene) : n_bodies_(scene.bodies.size())
+{
+    std::string errors;
+    for (const auto& issue : problems(scene))
+        errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
+    if (!errors.empty())
+        throw BadInput(errors);
+
+    first_id_ = {0};
+    const auto add = [&](const Shape& shape) {
+        lattices_.emplace_back(shape, scene.space.spacing, scene.dimensions);
+        first_id_.push_back(first_id_.back() + lattices_.back().size());
+        const Box& box = lattices_.back().bounds();
+        bounds_ = lattices_.size() == 1 ? box : united(bounds_, box);
+    };
+    for (const auto& body : scene.bodies)
+        add(body.shape);
+    soil_bounds_ = bounds_;
+    for (const auto& wall : scene.walls)
+        add(wall.shape);
+}
+
+std::int64_t Filling::soil_count_in(const Box& region) const
+{
+    std::int64_t sum = 0;
+    for (std::size_t b = 0; b < n_bodies_; ++b)
+        sum += lattices_[b].count_in(region);
+    return sum;
+}
+std::int64_t Filling::wall_count_in(const Box& region) const
+{
+    std::int64_t sum = 0;
+    for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)
+        sum += lattices_[w].count_in(region);
+    return sum;
+}
+
+std::size_t Filling::owner(std::int64_t id) const
+{
+    ensure(id >= 0 && id < first_id_.back(), "a particle is asked for whose id does not exist");
+    return std::size_t(std::upper_bound(first_id_.begin(), first_id_.end(), id) - first_id_.begin() - 1);
+}
+Vector Filling::soil_position(std::int64_t id) const
+{
+    ensure(id < soil_count(), "a wall's id is used as soil");
+    const std::size_t b = owner(id);
+    return lattices_[b].position(id - first_id_[b]);
+}
+int Filling::body_of(std::int64_t id) const
+{
+    ensure(id < soil_count(), "a wall's id is used as soil");
+    return int(owner(id));
+}
+Vector Filling::wall_position(std::int64_t id) const
+{
+    ensure(id >= soil_count(), "a soil particle's id is used as a wall");
+    const std::size_t w = owner(id);
+    return lattices_[w].position(id - first_id_[w]);
+}
+int Filling::wall_of(std::int64_t id) const
+{
+    ensure(id >= soil_count(), "a soil particle's id is used as a wall");
+    return int(owner(id) - n_bodies_);
+}
+
+} // namespace kuzure::scene

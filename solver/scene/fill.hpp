@@ -1,0 +1,180 @@
+#pragma once
+// The particles a scene starts with, computed and never stored: the lattice points of bodies and walls, by id
+// or by region. Every rank and every region gets the same bits, because one function computes every
+// coordinate.
+#include "solver/scene/issue.hpp"
+#include "solver/scene/scene.hpp"
+#include "solver/scene/shape.hpp"
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace kuzure::scene
+{
+
+/// Coordinate (m) of lattice point k along one axis: the only place where it is computed.
+inline double lattice_coordinate(double origin, std::int64_t k, double spacing)
+{
+    return origin + (double(k) + 0.5) * spacing;
+}
+
+/// The lattice points inside one shape. Order of local ids: z slowest, then y, then x. Boxes keep three
+/// numbers; other shapes keep, for every row along x, the intervals that lie inside.
+class Lattice
+{
+  public:
+    /// Throws Broken if the shape cannot be filled: ask problem() first.
+    Lattice(const Shape&, double spacing, int dimensions);
+    /// Why the shape cannot be filled with whole lattice points, or empty.
+    static std::string problem(const Shape&, double spacing, int dimensions);
+
+    std::int64_t size() const { return size_; }
+    Vector position(std::int64_t local) const;
+    /// The smallest box around the points (m); empty lattices have none.
+    const Box& bounds() const { return bounds_; }
+    /// Points in a closed region; in 2-D its y does not count.
+    std::int64_t count_in(const Box& region) const;
+    /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does
+    /// not count.
+    template <class Visit> void for_each_in(const Box& region, Visit visit) const;
+    /// True if a lattice point lies strictly inside another shape.
+    bool reaches_into(const Shape& other) const;
+
+  private:
+    struct Interval {
+        std::int64_t first, last; // indices along x, inclusive
+        std::int64_t before;      // points of the same row in front of it
+    };
+    struct Row {
+        std::span<const Interval> intervals;
+        std::int64_t size;
+    };
+    struct Range {
+        std::int64_t first, last; // inclusive; empty if last < first
+    };
+    struct Axis {
+        double origin = 0;
+        Range range{0, 0};
+    };
+    double coordinate(const Axis& a, std::int64_t k) const
+    {
+        return lattice_coordinate(a.origin, k, spacing_);
+    }
+    double y_of(std::int64_t k) const { return dimensions_ == 2 ? 0.0 : coordinate(y_, k); }
+    /// Indices of an axis whose coordinates lie in the closed interval low .. high.
+    Range within(const Axis&, double low, double high) const;
+    template <class Zones, class Visit> void for_each_run(Range, const Zones&, Visit) const;
+    /// Rows repeat along an axis on which the shape does not change: the stride there is 0.
+    std::size_t row_index(std::int64_t kz, std::int64_t ky) const
+    {
+        return std::size_t((kz - z_.range.first) * stride_z_ + (ky - y_.range.first) * stride_y_);
+    }
+    Row row(std::int64_t kz, std::int64_t ky) const
+    {
+        const std::size_t r = row_index(kz, ky), a = row_start_[r], b = row_start_[r + 1];
+        const std::span<const Interval> in(intervals_.data() + a, b - a);
+        return {in, in.empty() ? 0 : in.back().before + in.back().last - in.back().first + 1};
+    }
+    /// Local id of the first point of a row.
+    std::int64_t row_id(std::int64_t kz, std::int64_t ky) const
+    {
+        const std::int64_t iz = kz - z_.range.first, iy = ky - y_.range.first;
+        const std::int64_t layers = stride_z_ ? layer_id_[std::size_t(iz)] : iz * layer_id_[1];
+        if (stride_y_ == 0)
+            return layers + iy * row(kz, ky).size;
+        const std::size_t layer = stride_z_ ? std::size_t(iz) : 0, n_y = std::size_t(count(y_.range));
+        return layers + row_id_[layer * n_y + std::size_t(iy)];
+    }
+    static std::int64_t count(const Range& r) { return r.last - r.first + 1; }
+
+    int dimensions_;
+    double spacing_;
+    Axis x_, y_, z_;
+    std::int64_t stride_z_ = 0, stride_y_ = 0;
+    std::vector<std::size_t> row_start_; // first interval of every stored row, and the end
+    std::vector<Interval> intervals_;
+    std::vector<std::int64_t> layer_id_; // id of the first point of every stored layer, and the end
+    std::vector<std::int64_t>
+        row_id_; // id of a row's first point within its layer, where rows change along y
+    std::int64_t size_ = 0;
+    Box bounds_{};
+};
+
+/// All bodies and walls of a scene. Ids from 0: soil in file order, then walls.
+class Filling
+{
+  public:
+    /// Throws BadInput with the text of every error that problems() finds.
+    explicit Filling(const Scene&);
+    /// Boxes that do not hold whole particles, empty bodies, overlaps.
+    static Issues problems(const Scene&);
+
+    std::int64_t soil_count() const { return first_id_[n_bodies_]; }
+    std::int64_t wall_count() const { return first_id_.back() - soil_count(); }
+    /// Particles of one body or wall.
+    std::int64_t body_count(int body) const { return lattices_[std::size_t(body)].size(); }
+    std::int64_t wall_count(int wall) const { return lattices_[n_bodies_ + std::size_t(wall)].size(); }
+    /// The smallest box around all soil particles (m), and around all particles.
+    const Box& soil_bounds() const { return soil_bounds_; }
+    const Box& bounds() const { return bounds_; }
+
+    /// Calls visit(std::int64_t id, Vector x, int body) for the soil particles in a closed region, by rising
+    /// id.
+    template <class Visit> void for_each_soil_in(const Box& region, Visit visit) const
+    {
+        for (std::size_t b = 0; b < n_bodies_; ++b)
+            lattices_[b].for_each_in(region,
+                                     [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
+    }
+    /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising
+    /// id.
+    template <class Visit> void for_each_wall_in(const Box& region, Visit visit) const
+    {
+        for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)
+            lattices_[w].for_each_in(
+                region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
+    }
+    /// Soil or wall particles in a closed region, counted without visiting them.
+    std::int64_t soil_count_in(const Box& region) const;
+    std::int64_t wall_count_in(const Box& region) const;
+
+    /// Initial position (m) and body of a soil particle by its id.
+    Vector soil_position(std::int64_t id) const;
+    int body_of(std::int64_t soil_id) const;
+    /// Position (m) and wall of a wall particle by its id.
+    Vector wall_position(std::int64_t id) const;
+    int wall_of(std::int64_t wall_id) const;
+
+  private:
+    std::size_t owner(std::int64_t id) const;
+
+    std::size_t n_bodies_;
+    std::vector<Lattice> lattices_;      // bodies, then walls
+    std::vector<std::int64_t> first_id_; // of every lattice, and the end
+    Box soil_bounds_{}, bounds_{};
+};
+
+template <class Visit> void Lattice::for_each_in(const Box& region, Visit visit) const
+{
+    const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
+    const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
+    for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
+        for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
+            const double y = y_of(ky), z = coordinate(z_, kz);
+            const std::int64_t first = row_id(kz, ky);
+            for (const Interval& in : row(kz, ky).intervals) {
+                const std::int64_t a = std::max(in.first, xs.first), b = std::min(in.last, xs.last);
+                for (std::int64_t k = a; k <= b; ++k)
+                    visit(first + in.before + (k - in.first), Vector{coordinate(x_, k), y, z});
+            }
+        }
+}
+
+} // namespace kuzure::scene
+
+namespace kuzure
+{
+using scene::Filling;
+}

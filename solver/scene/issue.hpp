@@ -1,0 +1,18 @@
+#pragma once
+// What is wrong, or doubtful, about a scene. The reader turns the key into a file and line.
+#include <string>
+#include <vector>
+
+namespace kuzure::scene
+{
+
+enum class Severity { Warning, Error };
+struct Issue {
+    Severity severity;
+    std::string key;   // "body.0.box", as --set writes it
+    std::string text;  // what was expected, what was found, the remedy
+    std::string other; // the key of the other party, where two things disagree
+};
+using Issues = std::vector<Issue>;
+
+} // namespace kuzure::scene

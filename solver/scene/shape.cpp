@@ -1,0 +1,155 @@
+#include "solver/scene/shape.hpp"
+#include <limits>
+
+namespace kuzure::scene
+{
+namespace
+{
+
+struct Point {
+    double x, z;
+};
+Point operator-(Point a, Point b) { return {a.x - b.x, a.z - b.z}; }
+double cross(Point a, Point b) { return a.x * b.z - a.z * b.x; }
+double dot(Point a, Point b) { return a.x * b.x + a.z * b.z; }
+Point corner(const Polygon& p, std::size_t k)
+{
+    const auto& q = p.points[k % p.points.size()];
+    return {q[0], q[1]};
+}
+
+/// Even-odd rule in x-z.
+bool encloses(const Polygon& polygon, Point x)
+{
+    bool inside = false;
+    for (std::size_t k = 0; k < polygon.points.size(); ++k) {
+        const Point a = corner(polygon, k), b = corner(polygon, k + 1);
+        if ((a.z > x.z) != (b.z > x.z) && x.x < a.x + (x.z - a.z) / (b.z - a.z) * (b.x - a.x))
+            inside = !inside;
+    }
+    return inside;
+}
+
+Contact contact_in_plane(const Polygon& polygon, Point x)
+{
+    const std::size_t n = polygon.points.size();
+    const double turn = area(polygon) >= 0 ? 1 : -1;
+    const auto outward = [&](std::size_t k) {
+        const Point e = corner(polygon, k + 1) - corner(polygon, k);
+        const double l = std::hypot(e.x, e.z);
+        return Point{turn * e.z / l, -turn * e.x / l};
+    };
+    double nearest = std::numeric_limits<double>::infinity(), where = 0;
+    std::size_t edge = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        const Point a = corner(polygon, k), e = corner(polygon, k + 1) - a;
+        const double t = std::clamp(dot(x - a, e) / dot(e, e), 0.0, 1.0);
+        const Point d = x - Point{a.x + t * e.x, a.z + t * e.z};
+        if (const double d2 = dot(d, d); d2 < nearest)
+            nearest = d2, where = t, edge = k;
+    }
+    if (where > 0 && where < 1) {
+        const Point out = outward(edge);
+        return {dot(x - corner(polygon, edge), out), {out.x, 0, out.z}};
+    }
+    // A corner is closest: the normal points from it to the point outside or, on the corner, between its
+    // edges.
+    const std::size_t k = where > 0 ? (edge + 1) % n : edge;
+    const Point d = x - corner(polygon, k);
+    const double l = std::hypot(d.x, d.z);
+    const double sign = encloses(polygon, x) ? -1 : 1;
+    const Point e = corner(polygon, k + 1) - corner(polygon, k);
+    if (l > 1e-12 * std::hypot(e.x, e.z))
+        return {sign * l, {sign * d.x / l, 0, sign * d.z / l}};
+    const Point before = outward((k + n - 1) % n), after = outward(k),
+                sum{before.x + after.x, before.z + after.z};
+    const double s = std::hypot(sum.x, sum.z);
+    return {0, s > 1e-12 ? Vector{sum.x / s, 0, sum.z / s} : Vector{after.x, 0, after.z}};
+}
+
+/// True if the segments a-b and c-d share a point.
+bool meet(Point a, Point b, Point c, Point d)
+{
+    const auto side = [](Point p, Point q, Point r) { return cross(q - p, r - p); };
+    const auto within = [](Point p, Point q, Point r) {
+        return std::min(p.x, q.x) <= r.x && r.x <= std::max(p.x, q.x) && std::min(p.z, q.z) <= r.z &&
+               r.z <= std::max(p.z, q.z);
+    };
+    const double c1 = side(a, b, c), d1 = side(a, b, d), a1 = side(c, d, a), b1 = side(c, d, b);
+    if (((c1 > 0) != (d1 > 0)) && ((a1 > 0) != (b1 > 0)) && c1 != 0 && d1 != 0 && a1 != 0 && b1 != 0)
+        return true;
+    return (c1 == 0 && within(a, b, c)) || (d1 == 0 && within(a, b, d)) || (a1 == 0 && within(c, d, a)) ||
+           (b1 == 0 && within(c, d, b));
+}
+
+} // namespace
+
+Contact contact(const Polygon& polygon, Vector x, int dimensions)
+{
+    const auto in_plane = contact_in_plane(polygon, {x.x, x.z});
+    if (dimensions == 2)
+        return in_plane;
+    return detail::intersect(in_plane, detail::slab(x.y, polygon.y[0], polygon.y[1], {0, 1, 0}));
+}
+
+Box bounds(const Shape& shape)
+{
+    struct {
+        Box operator()(const Box& b) const { return b; }
+        Box operator()(const Cylinder& c) const
+        {
+            return {{c.base.x - c.radius, c.base.y - c.radius, c.base.z},
+                    {c.base.x + c.radius, c.base.y + c.radius, c.base.z + c.height}};
+        }
+        Box operator()(const Sphere& s) const
+        {
+            const Vector r{s.radius, s.radius, s.radius};
+            return {s.center - r, s.center + r};
+        }
+        Box operator()(const Polygon& p) const
+        {
+            const double far = std::numeric_limits<double>::infinity();
+            Box box{{far, p.y[0], far}, {-far, p.y[1], -far}};
+            for (const auto& [px, pz] : p.points) {
+                box.low.x = std::min(box.low.x, px), box.low.z = std::min(box.low.z, pz);
+                box.high.x = std::max(box.high.x, px), box.high.z = std::max(box.high.z, pz);
+            }
+            return box;
+        }
+    } of;
+    return std::visit(of, shape);
+}
+
+const char* name_of(const Shape& shape)
+{
+    static constexpr const char* names[] = {"box", "cylinder", "sphere", "polygon"};
+    return names[shape.index()];
+}
+
+double area(const Polygon& polygon)
+{
+    double sum = 0;
+    const Point origin = corner(polygon, 0);
+    for (std::size_t k = 1; k + 1 < polygon.points.size(); ++k)
+        sum += cross(corner(polygon, k) - origin, corner(polygon, k + 1) - origin);
+    return 0.5 * sum;
+}
+
+bool crosses_itself(const Polygon& polygon)
+{
+    const std::size_t n = polygon.points.size();
+    for (std::size_t i = 0; i < n; ++i) {
+        const Point a = corner(polygon, i), b = corner(polygon, i + 1), c = corner(polygon, i + 2);
+        if (a.x == b.x && a.z == b.z)
+            return true;
+        // Neighbouring edges share a corner; they may not run back over each other.
+        if (cross(b - a, c - b) == 0 && dot(b - a, c - b) < 0)
+            return true;
+        for (std::size_t j = i + 2; j < n; ++j)
+            if (!(i == 0 && j == n - 1) && meet(a, b, corner(polygon, j), corner(polygon, j + 1)))
+                return true;
+    }
+    return false;
+}
+
+} // namespace kuzure::scene

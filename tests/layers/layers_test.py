@@ -1,0 +1,165 @@
+#!/usr/bin/python3
+"""Includes point one way. Run as layers_test.py PROGRAM (which is not used); exits 1 and names file and line of what breaks a rule."""
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# A layer and the layers or single files that it may include beside itself.
+LAYERS = {
+    "solver/core": [],
+    "solver/scene": ["solver/core"],
+    "solver/physics": ["solver/core", "solver/scene"],
+    "solver/neighbours": ["solver/core", "solver/scene", "solver/physics"],
+    "solver/kernels": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours"],
+    "solver/effects": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours", "solver/kernels"],
+    "decomposition": ["solver/core", "solver/scene"],
+    "io": ["solver/core", "solver/scene"],
+    "perf/bench": ["solver", "decomposition", "io", "perf"],
+    "perf": ["solver/core/team.hpp"],
+    "solver/app": ["solver", "decomposition", "io", "perf"],
+    "tests": ["solver", "decomposition", "io", "perf"],
+}
+# Foreign headers that only one place may include; "deep": nor may others get them through a header of that place.
+FOREIGN = [
+    (r"mpi(-ext|io)?\.h", "decomposition", "deep"),
+    (r"(par)?metis\.h", "decomposition", "deep"),
+    (r"(hdf5(_hl)?|H5\w+)\.h", "io", "deep"),
+    (r"toml\+\+/.*|toml\.hpp", "io", "deep"),
+    (r".*intrin\.h|arm_(neon|sve)\.h|experimental/simd", "solver/core/simd.hpp", "direct"),
+]
+FOLDERS = {"solver", "decomposition", "io", "perf", "jobs", "tests", "docs", "cmake"}
+GENERATED = {"build", "results"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+def inside(path, place):
+    return path == place or path.startswith(place + "/")
+
+
+def layer_of(path):
+    return max((layer for layer in LAYERS if inside(path, layer)), key=len, default=None)
+
+
+def sources(root):
+    """Path from the root -> [(line number, is quoted, what it includes)] of every C++ file."""
+    found = {}
+    for folder in sorted(FOLDERS):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix in (".hpp", ".cpp", ".h", ".cc", ".hh", ".inl") and file.is_file():
+                lines = file.read_text(errors="replace").splitlines()
+                found[file.relative_to(root).as_posix()] = [
+                    (k, m[1] == '"', m[2]) for k, line in enumerate(lines, 1) if (m := INCLUDE.match(line))]
+    return found
+
+
+def foreign_through(path, includes, pattern, seen):
+    """The chain of project headers by which a file comes to a foreign header, or None."""
+    seen.add(path)
+    for _, _, what in includes.get(path, []):
+        if re.fullmatch(pattern, what):
+            return [path, f"<{what}>"]
+        if what in includes and what not in seen and (rest := foreign_through(what, includes, pattern, seen)):
+            return [path, *rest]
+    return None
+
+
+def violations(root, top_level):
+    includes = sources(root)
+    if not includes:
+        yield f"{root}: no sources found"
+    for name in sorted(top_level):
+        if name not in FOLDERS | GENERATED and not name.startswith("."):
+            yield f"{name}/: not one of the top-level folders {', '.join(sorted(FOLDERS))}"
+    for path, lines in includes.items():
+        layer = layer_of(path)
+        if layer is None:
+            yield f"{path}: a source outside every layer"
+            continue
+        for k, quoted, what in lines:
+            for pattern, place, _ in FOREIGN:
+                if re.fullmatch(pattern, what) and not inside(path, place):
+                    yield f"{path}:{k}: includes {what}, which only {place} may"
+            own = what in includes
+            if quoted and not own:
+                yield f"{path}:{k}: \"{what}\" is no file of the project as seen from its root"
+            if own and not quoted:
+                yield f"{path}:{k}: <{what}> is the project's own: write it in quotes"
+            if own and layer_of(what) != layer and not any(inside(what, allowed) for allowed in LAYERS[layer]):
+                yield f"{path}:{k}: {layer} may not include {what}"
+            for pattern, place, depth in FOREIGN:
+                if own and depth == "deep" and not inside(path, place):
+                    chain = foreign_through(what, includes, pattern, set())
+                    # Said where a file of that place is included from outside it, not again by everything above.
+                    if chain and inside(what, place):
+                        yield f"{path}:{k}: comes to {chain[-1]} through {' -> '.join(chain[:-1])}"
+
+
+def top_level_folders(root):
+    """Folders that git keeps; without git, those that are there."""
+    try:
+        listing = subprocess.run(["git", "-C", str(root), "ls-files", "-z"], capture_output=True, text=True, check=True)
+        return {name.split("/")[0] for name in listing.stdout.split("\0") if "/" in name}
+    except (OSError, subprocess.CalledProcessError):
+        return {entry.name for entry in root.iterdir() if entry.is_dir()}
+
+
+PLANTED = {  # file, its text, what must be said of it ("" for nothing)
+    "solver/core/simd.hpp": ("#include <immintrin.h>\n", ""),
+    "solver/core/team.hpp": ("#include <span>\n", ""),
+    "solver/core/up.hpp": ('#include "solver/scene/scene.hpp"\n', "solver/core may not include solver/scene/scene.hpp"),
+    "solver/scene/scene.hpp": ('#include "solver/core/simd.hpp"\n', ""),
+    "solver/physics/wide.hpp": ("#  include <x86intrin.h> // why\n", "includes x86intrin.h"),
+    "solver/physics/loop.hpp": ('#include "solver/kernels/step.hpp"\n', "solver/physics may not include"),
+    "solver/kernels/step.hpp": ('#include "solver/physics/wide.hpp"\n', ""),
+    "solver/kernels/late.hpp": ('#include "solver/effects/list.hpp"\n', "solver/kernels may not include"),
+    "solver/effects/list.hpp": ('#include "solver/kernels/step.hpp"\n', ""),
+    "solver/effects/near.hpp": ('#include "list.hpp"\n', "no file of the project"),
+    "solver/effects/angle.hpp": ("#include <solver/core/team.hpp>\n", "write it in quotes"),
+    "decomposition/comm.hpp": ("#include <mpi.h>\n", ""),
+    "decomposition/cut.hpp": ('#include "decomposition/comm.hpp"\n#include <metis.h>\n', ""),
+    "decomposition/file.cpp": ("#include <hdf5.h>\n", "includes hdf5.h, which only io may"),
+    "io/file.cpp": ('#include <hdf5.h>\n#include <toml++/toml.h>\n#include "solver/core/team.hpp"\n', ""),
+    "io/ranks.cpp": ('#include "decomposition/comm.hpp"\n', "io may not include decomposition/comm.hpp"),
+    "io/direct.cpp": ("#include <mpi.h>\n", "includes mpi.h, which only decomposition may"),
+    "perf/report.hpp": ('#include "solver/core/team.hpp"\n', ""),
+    "perf/greedy.hpp": ('#include "solver/core/simd.hpp"\n', "perf may not include solver/core/simd.hpp"),
+    "perf/bench/rates.cpp": ('#include "solver/kernels/step.hpp"\n', ""),
+    "solver/app/main.cpp": ('#include "perf/report.hpp"\n', ""),
+    "solver/app/cut.cpp": ('#include "decomposition/cut.hpp"\n', "comes to <mpi.h> through decomposition/cut.hpp -> decomposition/comm.hpp"),
+    "solver/app/scene.cpp": ("#include <toml++/toml.h>\n", "which only io may"),
+    "tests/unit/metis_test.cpp": ("#include <metis.h>\n", "includes metis.h"),
+    "jobs/tool.cpp": ("#include <span>\n", "outside every layer"),
+}
+
+
+def check_the_check():
+    """Every planted violation must be found, and nothing else."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        for path, (text, _) in PLANTED.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text)
+        (root / "misc").mkdir()
+        said = list(violations(root, {entry.name for entry in root.iterdir()}))
+    wrong = []
+    for path, (_, expected) in PLANTED.items():
+        about = [line for line in said if re.match(re.escape(path) + ":", line)]
+        if (not expected and about) or (expected and not any(expected in line for line in about)):
+            wrong.append(f"self-check: {path}: expected {expected or 'nothing'!r}, got {about}")
+    if not any(line.startswith("misc/:") for line in said):
+        wrong.append("self-check: the folder misc was not found")
+    return wrong
+
+
+def main():
+    wrong = check_the_check() or list(violations(ROOT, top_level_folders(ROOT)))
+    print("\n".join(wrong) if wrong else f"includes point one way in {len(sources(ROOT))} files")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,409 @@
+// Every rule of the reader is broken once, and what is written reads back to the same bits.
+#include "io/scene_file.hpp"
+#include "io/scene_keys.hpp"
+#include "solver/core/ensure.hpp"
+#include "solver/scene/fill.hpp"
+#include <algorithm>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <numbers>
+#include <regex>
+
+using namespace kuzure;
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+namespace
+{
+
+const fs::path source = KUZURE_SOURCE_DIR;
+
+const std::string least = R"(title = "least"
+dimensions = 3
+[space]
+spacing = 0.1
+[time]
+end = 1
+[soil.sand]
+density = 1850
+young = 1.8e6
+poisson = 0.3
+friction_angle = 25
+[[body]]
+soil = "sand"
+box = { low = [0, 0, 0], high = [1, 1, 1] }
+)";
+
+const std::string full = R"(title = "all \"keys\" \\ at once"
+dimensions = 3
+[space]
+spacing = 0.1
+h = 1.25
+low = [-2.0, -1.0, -3.0]
+high = [5.0, 4.0, 9.0]
+periodic = ["y"]
+[time]
+end = 0.7
+step = 1e-4
+[soil.sand]
+density = 1850.3
+young = 1.7e6
+poisson = 0.31
+friction_angle = 25.3
+dilation_angle = 1.1
+cone = "plane strain, no dilation"
+[soil.clay]
+density = 1600
+young = 1e6
+poisson = 0.4
+cohesion = 4.7e3
+friction_angle = 7.7
+tension_cutoff = 123.456
+cone = "extension"
+[soil.a]
+density = 1600
+young = 1e6
+poisson = 0.4
+cohesion = 4.7e3
+[[body]]
+soil = "sand"
+box = { low = [0, 0, 0], high = [1, 1, 1] }
+velocity = [0.1, -0.2, 0.3]
+stress = "at rest"
+[[body]]
+soil = "clay"
+cylinder = { base = [3, 1.5, 0.0], radius = 0.7, height = 0.8 }
+[[body]]
+soil = "a"
+sphere = { center = [0.5, 0.5, 3.0], radius = 0.7 }
+[[body]]
+soil = "sand"
+polygon = { points = [[0, 5], [1, 5], [0.3, 6.1]], y = [0.0, 1.0] }
+[[wall]]
+box = { low = [-1, -1, -0.4], high = [4, 4, 0] }
+surface = { friction_angle = 20.1 }
+[[wall]]
+polygon = { points = [[4.1, 0], [4.9, 0], [4.5, 1]], y = [0, 1] }
+surface = "smooth"
+[effects]
+gravity = [0, 0, -9.81]
+viscosity = { alpha = 0.1 }
+artificial_stress = { epsilon = 0.4 }
+damping = { ratio = 0.02, until = 0.5 }
+[accuracy]
+kernel = "wendland c4"
+cfl = 0.3
+precision = "mixed"
+skin = 0.07
+[output]
+directory = "results/x"
+every = 0.05
+fields = ["stress", "velocity"]
+history = 0.001
+grain = 0.08
+checkpoint_minutes = 12
+picture = { color = "speed" }
+)";
+
+std::string text_of(const fs::path& path)
+{
+    std::ifstream in(path);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string refusal(const std::string& text, std::vector<std::string> sets = {})
+{
+    try {
+        io::parse_scene(text, "s.toml", sets);
+    } catch (const BadInput& e) {
+        return e.what();
+    }
+    return "accepted";
+}
+
+Scene parsed(const std::string& text, std::vector<std::string> sets = {})
+{
+    return io::parse_scene(text, "s.toml", sets);
+}
+
+class BadScene : public ::testing::TestWithParam<fs::path>
+{
+};
+std::vector<fs::path> bad_scenes()
+{
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(source / "tests/scenes/bad"))
+        if (entry.path().extension() == ".toml")
+            files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+} // namespace
+
+TEST_P(BadScene, IsRefusedWithItsMessage)
+{
+    const auto text = text_of(GetParam());
+    const std::string marker = "# expect: ";
+    ASSERT_TRUE(text.starts_with(marker));
+    const auto expected = text.substr(marker.size(), text.find('\n') - marker.size());
+    try {
+        io::read_scene(GetParam());
+        FAIL() << "accepted";
+    } catch (const BadInput& e) {
+        const std::string message = e.what();
+        EXPECT_TRUE(std::regex_search(message, std::regex(expected)))
+            << "expected: " << expected << "\nfound:    " << message;
+        EXPECT_TRUE(message.starts_with(GetParam().string() + ":")) << message;
+        const auto lines = std::count(message.begin(), message.end(), '\n') + 1;
+        EXPECT_LE(lines, GetParam().stem() == "several" ? 2 : 3) << "one mistake, many complaints:\n"
+                                                                 << message;
+    }
+}
+INSTANTIATE_TEST_SUITE_P(Corpus, BadScene, ::testing::ValuesIn(bad_scenes()),
+                         [](const auto& info) { return info.param.stem().string(); });
+
+TEST(SceneFile, CorpusIsLarge) { EXPECT_GE(bad_scenes().size(), 60u); }
+
+TEST(SceneFile, EveryJobIsReadWithoutAWarning)
+{
+    for (const auto& entry : fs::directory_iterator(source / "jobs/scenes"))
+        if (entry.path().extension() == ".toml") {
+            const auto scene = io::read_scene(entry.path());
+            for (const auto& issue : scene::check(scene))
+                ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
+        }
+}
+
+TEST(SceneFile, DefaultsOfTheTableAreThoseOfTheStructs)
+{
+    const auto scene = parsed(least);
+    Scene plain;
+    plain.space.spacing = 0.1, plain.time.end = 1;
+    EXPECT_EQ(scene.space, plain.space);
+    EXPECT_EQ(scene.time, plain.time);
+    EXPECT_EQ(scene.accuracy, plain.accuracy);
+    EXPECT_EQ(scene.output, plain.output);
+    EXPECT_EQ(scene.effects, plain.effects);
+    EXPECT_TRUE(scene.walls.empty());
+    scene::Soil sand;
+    sand.name = "sand", sand.density = 1850, sand.young = 1.8e6, sand.poisson = 0.3;
+    sand.friction_angle = 25 * (std::numbers::pi / 180);
+    ASSERT_EQ(scene.soils.size(), 1u);
+    EXPECT_EQ(scene.soils[0], sand);
+    ASSERT_EQ(scene.bodies.size(), 1u);
+    EXPECT_EQ(scene.bodies[0], (scene::Body{0, scene::Box{{0, 0, 0}, {1, 1, 1}}}));
+    const auto table = parsed(least + "[effects]\nartificial_stress = {}\n[output]\npicture = {}\n");
+    EXPECT_EQ(table.effects.artificial_stress, scene::ArtificialStress{});
+    EXPECT_EQ(table.output.picture, scene::Picture{});
+    const auto wall = parsed(least + "[[wall]]\nsphere = { center = [9, 9, 9], radius = 1 }\n");
+    EXPECT_EQ(wall.walls[0], (scene::Wall{scene::Sphere{{9, 9, 9}, 1}}));
+}
+
+TEST(SceneFile, EveryKeyArrives)
+{
+    const auto s = parsed(full);
+    EXPECT_EQ(s.title, "all \"keys\" \\ at once");
+    EXPECT_EQ(s.space.h, 1.25);
+    EXPECT_EQ(s.space.high, (Vector{5, 4, 9}));
+    EXPECT_EQ(s.space.periodic, (std::array<bool, 3>{false, true, false}));
+    EXPECT_EQ(s.time.step, 1e-4);
+    ASSERT_EQ(s.soils.size(), 3u);
+    EXPECT_EQ(s.soils[0].name, "sand");
+    EXPECT_EQ(s.soils[1].name, "clay");
+    EXPECT_EQ(s.soils[2].name, "a");
+    EXPECT_EQ(s.soils[0].cone, scene::Cone::PlaneStrainNoDilation);
+    EXPECT_EQ(s.soils[1].tension_cutoff, 123.456);
+    EXPECT_EQ(s.bodies[1].soil, 1);
+    EXPECT_EQ(s.bodies[2].soil, 2);
+    EXPECT_EQ(s.bodies[0].stress, scene::InitialStress::AtRest);
+    EXPECT_EQ(s.bodies[0].velocity, (Vector{0.1, -0.2, 0.3}));
+    EXPECT_EQ(std::get<scene::Cylinder>(s.bodies[1].shape), (scene::Cylinder{{3, 1.5, 0}, 0.7, 0.8}));
+    EXPECT_EQ(std::get<scene::Polygon>(s.bodies[3].shape).points.at(2), (std::array<double, 2>{0.3, 6.1}));
+    EXPECT_EQ(s.walls[0].surface, scene::Surface::Coulomb);
+    EXPECT_DOUBLE_EQ(s.walls[0].friction_angle, 20.1 * std::numbers::pi / 180);
+    EXPECT_EQ(s.walls[1].surface, scene::Surface::Smooth);
+    EXPECT_EQ(s.effects.viscosity, (scene::Viscosity{0.1, 0}));
+    EXPECT_EQ(s.effects.artificial_stress, (scene::ArtificialStress{0.4, 2.55}));
+    EXPECT_EQ(s.effects.damping, (scene::Damping{0.02, 0.5}));
+    EXPECT_EQ(s.accuracy.kernel, scene::Kernel::WendlandC4);
+    EXPECT_EQ(s.accuracy.precision, scene::Precision::Mixed);
+    EXPECT_EQ(s.output.fields, (std::vector<std::string>{"stress", "velocity"}));
+    EXPECT_EQ(s.output.grain, 0.08);
+    EXPECT_EQ(s.output.picture, (scene::Picture{scene::View::Oblique, scene::Color::Speed}));
+}
+
+TEST(SceneFile, WhatIsWrittenReadsBackToTheSameScene)
+{
+    std::vector<std::string> texts{least, full, least + "[effects]\nartificial_stress = \"auto\"\n"};
+    for (const auto& entry : fs::directory_iterator(source / "jobs/scenes"))
+        texts.push_back(text_of(entry.path()));
+    for (const auto& text : texts) {
+        const auto scene = parsed(text);
+        const auto written = io::write_scene(scene);
+        const auto again = parsed(written);
+        EXPECT_TRUE(again == scene) << written;
+        EXPECT_EQ(io::write_scene(again), written);
+        EXPECT_EQ(io::scene_hash(again), io::scene_hash(scene));
+    }
+}
+
+TEST(SceneFile, AnglesSurviveBitForBit)
+{
+    for (int k = 0; k < 2000; ++k) {
+        const double angle = 0.01 + k * 0.04497;
+        const auto scene = parsed(least, {fmt::format("soil.sand.friction_angle={}", angle)});
+        const auto again = parsed(io::write_scene(scene));
+        ASSERT_EQ(again.soils[0].friction_angle, scene.soils[0].friction_angle) << angle;
+    }
+    EXPECT_THAT(io::write_scene(parsed(least)), HasSubstr("friction_angle = 25.0 "));
+}
+
+TEST(SceneFile, SetsOverride)
+{
+    const auto s =
+        parsed(least, {"space.spacing=0.05", "soil.sand.cohesion = 100", "accuracy.kernel=wendland c2",
+                       "title=42", "body.0.velocity=[1, 2, 3]", "effects.viscosity.alpha=0.3",
+                       "output.picture={view=\"top\"}", "accuracy.cfl=0.3", "accuracy.cfl=0.1"});
+    EXPECT_EQ(s.space.spacing, 0.05);
+    EXPECT_EQ(s.soils[0].cohesion, 100);
+    EXPECT_EQ(s.accuracy.kernel, scene::Kernel::WendlandC2);
+    EXPECT_EQ(s.title, "42");
+    EXPECT_EQ(s.bodies[0].velocity, (Vector{1, 2, 3}));
+    EXPECT_EQ(s.effects.viscosity, (scene::Viscosity{0.3, 0}));
+    EXPECT_EQ(s.output.picture->view, scene::View::Top);
+    EXPECT_EQ(s.accuracy.cfl, 0.1);
+    EXPECT_EQ(parsed(full, {"wall.1.surface.friction_angle=10"}).walls[1].surface, scene::Surface::Coulomb);
+    EXPECT_EQ(parsed(full, {"effects.artificial_stress=auto"}).effects.artificial_stress_decision,
+              scene::Decision::Auto);
+}
+
+TEST(SceneFile, WrongSetsAreRefused)
+{
+    EXPECT_THAT(refusal(least, {"space.spaceing=0.05"}),
+                HasSubstr("--set space.spaceing=0.05: space.spaceing: expected a known key"));
+    EXPECT_THAT(refusal(least, {"space.spacing=-1"}),
+                HasSubstr("--set space.spacing=-1: space.spacing: expected a number in m"));
+    EXPECT_THAT(refusal(least, {"space.spacing=fine"}),
+                HasSubstr("--set space.spacing=fine: space.spacing: expected a number in m"));
+    EXPECT_THAT(refusal(least, {"space.spacing"}), HasSubstr("expected key.path=value"));
+    EXPECT_THAT(refusal(least, {"space.spacing="}), HasSubstr("expected key.path=value"));
+    EXPECT_THAT(refusal(least, {"=3"}), HasSubstr("expected key.path=value"));
+    EXPECT_THAT(refusal(least, {"space..h=3"}), HasSubstr("expected key.path=value"));
+    EXPECT_THAT(refusal(least, {"body.1.velocity=[0,0,0]"}),
+                HasSubstr("expected a number from 0 to 0 after body"));
+    EXPECT_THAT(refusal(least, {"title.x=3"}), HasSubstr("expected a key inside a table"));
+    EXPECT_THAT(refusal(least, {"time.end=1\nstep=2"}), HasSubstr("time.end: expected a number"));
+    EXPECT_THAT(refusal(least, {"title=\xff"}), HasSubstr("expected UTF-8"));
+}
+
+TEST(SceneFile, BytesThatAreNoTextAreRefused)
+{
+    EXPECT_THAT(refusal(least + "# \xff\n"), HasSubstr("s.toml:15: expected UTF-8, found the byte 0xff"));
+    EXPECT_THAT(refusal(least + "# \xC0\x80\n"), HasSubstr("expected UTF-8"));
+    EXPECT_THAT(refusal(least + "# \xED\xA0\x80\n"), HasSubstr("expected UTF-8"));
+    EXPECT_THAT(refusal(least + "# \xE2\x82"), HasSubstr("expected UTF-8"));
+    EXPECT_THAT(refusal("\xEF\xB9\xBF:" + least),
+                HasSubstr("s.toml:1: expected text, found the character U+FE7F"));
+    EXPECT_THAT(refusal(least + "\n\xEF\xBB\xBD"),
+                HasSubstr("s.toml:16: expected text, found the character U+FEFD"));
+    EXPECT_THAT(refusal(least + std::string(1 << 20, ' ')), HasSubstr("at most 1 MiB"));
+    EXPECT_THAT(refusal(std::string("title = \"a\0b\"\n", 15) + least), HasSubstr("expected TOML"));
+    EXPECT_THAT(refusal(""), HasSubstr("title: expected a string, found nothing"));
+    EXPECT_THAT(refusal(std::string(100000, '[')), HasSubstr("expected TOML"));
+    EXPECT_EQ(parsed("\xEF\xBB\xBF" + least).title, "least");
+    EXPECT_EQ(parsed("# 砂の崩壊\n" + least, {"title=崩れ"}).title, "崩れ");
+}
+
+TEST(SceneFile, FilesThatCannotBeReadAreRefused)
+{
+    const auto message = [](const fs::path& path) {
+        try {
+            io::read_scene(path);
+        } catch (const BadInput& e) {
+            return std::string(e.what());
+        }
+        return std::string("accepted");
+    };
+    EXPECT_THAT(message("no/such.toml"),
+                HasSubstr("no/such.toml: expected a scene file, found No such file"));
+    EXPECT_THAT(message("/"), HasSubstr("found a directory"));
+}
+
+TEST(SceneFile, AtMostTwentyProblemsAreShown)
+{
+    std::string text = least;
+    for (int k = 0; k < 30; ++k)
+        text += fmt::format("unknown_{} = 1\n", k);
+    const auto message = refusal(text);
+    EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 20);
+    EXPECT_THAT(message, HasSubstr("and 10 more"));
+}
+
+TEST(SceneFile, AnUnstableStepCanBeForced)
+{
+    const std::vector<std::string> sets{"time.step=0.01"};
+    EXPECT_THROW(io::parse_scene(least, "s.toml", sets), BadInput);
+    EXPECT_EQ(io::parse_scene(least, "s.toml", sets, scene::StepLimit::Force).time.step, 0.01);
+}
+
+TEST(SceneFile, HashTellsPhysicsFromBookkeeping)
+{
+    const auto hash = [](std::vector<std::string> sets) { return io::scene_hash(parsed(full, sets)); };
+    const auto same = hash({});
+    EXPECT_EQ(same.size(), 16u);
+    for (const char* set : {"title=other", "time.end=2", "output.every=0.1", "output.directory=elsewhere",
+                            "output.grain=0.1", "space.h=1.25"})
+        EXPECT_EQ(hash({set}), same) << set;
+    for (const char* set :
+         {"time.step=2e-4", "space.h=1.3", "soil.clay.cohesion=4701", "body.0.velocity=[0,0,0]",
+          "wall.1.surface=rough", "effects.gravity=[0,0,-9.8]", "accuracy.kernel=cubic spline",
+          "accuracy.precision=double", "body.2.soil=sand", "effects.damping.until=0.4",
+          "body.3.polygon.y=[0.0,0.9]", "space.periodic=[\"x\",\"y\"]", "soil.sand.friction_angle=25.4"})
+        EXPECT_NE(hash({set}), same) << set;
+    auto renamed = parsed(full);
+    renamed.soils[0].name = "gravel";
+    EXPECT_EQ(io::scene_hash(renamed), same);
+    // "auto" that turns out off is the same physics as nothing written.
+    EXPECT_EQ(io::scene_hash(parsed(least, {"effects.artificial_stress=auto"})),
+              io::scene_hash(parsed(least)));
+}
+
+TEST(SceneFile, ReferenceNamesEveryKey)
+{
+    const auto reference = io::scene_reference();
+    for (const auto& key : io::scene_keys())
+        EXPECT_THAT(reference, HasSubstr(std::string(key.leaf() == "*" ? "soil" : key.leaf())));
+    EXPECT_THAT(reference, HasSubstr("## `[[body]]`"));
+    EXPECT_THAT(reference, HasSubstr("| `spacing` | number | m | needed | 1e-06 <= x <= 1e+06 |"));
+}
+
+TEST(SceneKeys, EveryExampleAndDefaultIsLegal)
+{
+    // Examples stand in messages: they must not lead into the next error.
+    for (const auto& key : io::scene_keys()) {
+        if (key.path.find('*') != key.path.npos || key.kind == io::Kind::Table ||
+            key.kind == io::Kind::Tables || key.kind == io::Kind::Named)
+            continue;
+        for (const auto& value : {key.example, key.fallback}) {
+            if (value.empty())
+                continue;
+            const auto message = refusal(full, {key.path + "=" + value, "effects.gravity=[0,0,-9.81]"});
+            EXPECT_THAT(message, ::testing::Not(HasSubstr("--set " + key.path + "=" + value + ": " +
+                                                          key.path + ": expected a ")))
+                << value;
+        }
+    }
+}
+
+TEST(SceneKeys, NearestWordIsFound)
+{
+    EXPECT_EQ(io::edit_distance("kernel", "kernel"), 0);
+    EXPECT_EQ(io::edit_distance("kenrel", "kernel"), 1);
+    EXPECT_EQ(io::edit_distance("", "abc"), 3);
+    EXPECT_EQ(io::nearest("frction_angle", {"friction_angle", "dilation_angle"}), "friction_angle");
+    EXPECT_EQ(io::nearest("x", {}), "");
+}
