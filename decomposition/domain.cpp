@@ -13,6 +13,17 @@ namespace
 
 std::array<double, 3> axes(Vector v) { return {v.x, v.y, v.z}; }
 
+std::string lost_at(Vector x)
+{
+    return fmt::format(
+        "a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into blocks: the run "
+        "has blown up; try a smaller time step",
+        x.x, x.y, x.z);
+}
+
+/// Particles below which threads cost more than they bring.
+constexpr Index parallel = 4096;
+
 double now()
 {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -85,20 +96,19 @@ Block Domain::wrapped(Block b) const
     return b;
 }
 
-void Domain::complain(Vector x) const
-{
-    throw NumbersFailed(
-        fmt::format("a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into "
-                    "blocks: the run has blown up; try a smaller time step",
-                    x.x, x.y, x.z));
-}
-
 Block Domain::block_of(Vector x) const
 {
     Block b;
     if (!raw_block(x, b))
-        complain(x);
+        throw NumbersFailed(lost_at(x));
     return wrapped(b);
+}
+
+void Domain::stop_if_lost(bool mine, Vector x) const
+{
+    const int rank = int(comm_.max(std::int64_t(mine ? comm_.rank() : -1)));
+    if (rank >= 0)
+        throw NumbersFailed(comm_.broadcast(mine ? lost_at(x) : std::string(), rank));
 }
 
 int Domain::owner_of(const Block& asked) const
@@ -239,7 +249,7 @@ Domain::Moved Domain::migrate(Particles& p) const
     const Index n = p.size();
     std::vector<int> owner(n);
     Index lost = -1;
-#pragma omp parallel reduction(max : lost)
+#pragma omp parallel reduction(max : lost) if (n > parallel)
     {
         Block last{};
         int last_owner = -1;
@@ -255,14 +265,7 @@ Domain::Moved Domain::migrate(Particles& p) const
             owner[i] = last_owner;
         }
     }
-    // All ranks stop together; those whose particles are sound name no place.
-    if (comm_.any(lost >= 0)) {
-        if (lost >= 0)
-            complain(x[lost]);
-        throw NumbersFailed(
-            "a soil particle of another rank left anything that can be cut into blocks: the run has "
-            "blown up; try a smaller time step");
-    }
+    stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
 
     std::map<int, std::vector<Index>> leaving;
     std::vector<Index> stay;
@@ -349,13 +352,16 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     // across a period's seam would fill a box as long as the period.
     std::vector<std::uint64_t> key(n);
     double largest = 0;
-    bool lost = false, outside = false;
+    bool outside = false;
+    Index lost = -1;
     const auto low = axes(period_low_), length = axes(period_length_);
-#pragma omp parallel for schedule(static) reduction(max : largest) reduction(|| : lost, outside)
+#pragma omp parallel for schedule(static) reduction(max                                                      \
+                                                    : largest, lost) reduction(||                            \
+                                                                               : outside) if (n > parallel)
     for (Index i = 0; i < n; ++i) {
         Block b;
         if (!raw_block(x[i], b)) {
-            lost = true;
+            lost = std::max(lost, i);
             continue;
         }
         key[i] = key_of(b);
@@ -367,10 +373,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
                 outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
         }
     }
-    if (comm_.any(lost))
-        throw NumbersFailed(
-            "a soil particle left anything that can be cut into blocks: the run has blown up; try a "
-            "smaller time step");
+    stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
     ensure(!comm_.any(outside), "a halo is planned while particles lie outside the period");
 
     std::unordered_map<std::uint64_t, int> local;
@@ -396,7 +399,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             member[next[group[i]]++] = i;
     }
     const int n_boxes = int(box.size());
-#pragma omp parallel for schedule(dynamic)
+#pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g)
         for (Index k = first[g]; k < first[g + 1]; ++k) {
             const Vector v = x[member[k]];
@@ -438,7 +441,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
         HaloPlan::Send send;
     };
     std::vector<std::vector<Entry>> found(n_boxes);
-#pragma omp parallel for schedule(dynamic)
+#pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g) {
         std::vector<const Bounds*> near;
         for (int peer = 0; peer < int(theirs.size()); ++peer) {

@@ -67,7 +67,8 @@ class Domain
     /// Without the wrap; nothing where block_of() would throw.
     bool raw_block(Vector x, Block& b) const;
     Block wrapped(Block) const;
-    [[noreturn]] void complain(Vector x) const;
+    /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
+    void stop_if_lost(bool mine, Vector x) const;
 
     const Comm& comm_;
     Vector origin_, size_, period_low_, period_length_;

@@ -102,8 +102,6 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
     low = team.min(low), high = team.max(high);
     if (low > high)
         return {0, 1};
-    if (color == scene::Color::Displacement)
-        high = std::max(high, spacing);
     const bool from_zero = color != scene::Color::Pressure;
     if (from_zero)
         low = std::min(low, 0.0);
@@ -134,6 +132,8 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
     } else {
         r.high = r.low + 1;
     }
+    if (color == scene::Color::Displacement && (r.high < spacing || high == low))
+        r = {0, spacing, false, high > spacing};
     return r;
 }
 

@@ -2,6 +2,9 @@
 #include "solver/app/command.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#if defined(KUZURE_TRAP_FPE)
+#include <cfenv>
+#endif
 
 using namespace kuzure;
 
@@ -13,6 +16,9 @@ int main(int argc, char** argv)
     Action chosen;
     add_run(app, chosen);
     add_check(app, chosen);
+#if defined(KUZURE_TRAP_FPE)
+    feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
+#endif
     Environment mpi(argc, argv);
     const Comm& comm = Comm::world();
     const bool speaks = comm.rank() == 0;

@@ -270,6 +270,7 @@ Wishes Simulation::step(Wishes mine)
                 });
             });
             result = timers_.timed(Phase::Interior, [&] { return model_->run(pass, lists_.interior()); });
+            count_work(Phase::Interior, result.pairs, lists_.interior().size());
             timers_.timed(Phase::HaloWait, [&] {
                 halo_->arrive([&](Index slot, const std::byte* row) {
                     std::memcpy(&buffers.now[n + slot], row, sizeof(Record<T>));
@@ -277,6 +278,7 @@ Wishes Simulation::step(Wishes mine)
                 });
             });
             const PassResult rim = timers_.timed(Phase::Rim, [&] { return model_->run(pass, lists_.rim()); });
+            count_work(Phase::Rim, rim.pairs, lists_.rim().size());
             const auto add = [](PassResult& a, const PassResult& b) {
                 a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
                 a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
@@ -309,6 +311,13 @@ Wishes Simulation::step(Wishes mine)
     });
     if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0) report_failure();
     return mine;
+}
+
+void Simulation::count_work(Phase phase, std::int64_t pairs, std::size_t clusters)
+{
+    const double particles = double(clusters) / std::max<double>(1, double(lists_.size())) * particles_.size();
+    timers_.did(phase, double(pairs) * model_->flops_per_pair() + particles * model_->flops_per_particle(),
+                particles * model_->bytes_per_particle());
 }
 
 void Simulation::report_failure()

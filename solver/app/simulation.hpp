@@ -105,6 +105,7 @@ private:
     void renew_walls();
     void make_records();
     bool outgrown() const;
+    void count_work(Phase, std::int64_t pairs, std::size_t clusters);
     std::size_t row_bytes() const;
     [[noreturn]] void report_failure();
     double smallest_time_scale() const;

@@ -82,6 +82,11 @@ public:
     virtual int cluster_width() const = 0;
     virtual scene::Precision precision() const = 0;
     virtual bool tensile() const = 0;
+    /// Floating-point operations of one directed pair (an fma counts two; square root, division, min and max one), and of
+    /// the update of one particle; bytes of main memory that one particle's step moves: for the roofline.
+    virtual double flops_per_pair() const = 0;
+    virtual double flops_per_particle() const = 0;
+    virtual double bytes_per_particle() const = 0;
     virtual PassResult run(const Pass<double>&, std::span<const Index> clusters) const = 0;
     virtual PassResult run(const Pass<float>&, std::span<const Index> clusters) const = 0;
 };

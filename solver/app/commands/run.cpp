@@ -131,8 +131,7 @@ public:
     Exit go()
     {
         open();
-        const Exit code = loop();
-        return code;
+        return loop();
     }
 
 private:
