@@ -93,7 +93,8 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
         for (Index i = 0; i < particles_.size(); ++i) count[domain_.block_of(particles_[field::position][i])] += 1;
         std::vector<BlockWork> work;
         for (const auto& [b, n] : count) work.push_back({b, n, n});
-        domain_.cut(work, Method::Metis, {reach_, double(row_bytes())});
+        const auto report = domain_.cut(work, Method::Metis, {reach_, double(row_bytes())});
+        rebalance_ = Rebalance(report.imbalance, report.seconds);
         domain_.migrate(particles_);
         if (clock_.step > 0) rebuild(false);
     });

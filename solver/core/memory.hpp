@@ -1,7 +1,9 @@
 #pragma once
 // Arrays for hot loops: aligned to a cache line, on huge pages where they are large, and not touched when they are
 // made, so that the thread that first writes a page owns it.
+#include <atomic>
 #include <cstdlib>
+#include <cstring>
 #include <new>
 #include <type_traits>
 #include <utility>
@@ -15,34 +17,57 @@
 
 namespace kuzure {
 
+namespace detail {
+inline std::atomic<std::size_t> allocations = 0;
+
+inline void* get(std::size_t align, std::size_t bytes, [[maybe_unused]] bool large)
+{
+#if defined(KUZURE_MEMKIND)
+    // Large arrays into the high-bandwidth memory while there is some, then into the ordinary one.
+    if (large) {
+        void* fast = nullptr;
+        return hbw_posix_memalign(&fast, align, bytes) == 0 ? fast : nullptr;
+    }
+#endif
+    void* p = std::aligned_alloc(align, bytes);
+#if defined(__linux__)
+    if (p && large) madvise(p, bytes, MADV_HUGEPAGE);
+#endif
+    return p;
+}
+inline void give_back(void* p, [[maybe_unused]] bool large)
+{
+#if defined(KUZURE_MEMKIND)
+    if (large) return hbw_free(p);
+#endif
+    std::free(p);
+}
+} // namespace detail
+
 template <class T> struct HugePages {
     using value_type = T;
     HugePages() = default;
     template <class U> HugePages(const HugePages<U>&) {}
     T* allocate(std::size_t n)
     {
-        const std::size_t page = std::size_t(1) << 21, small = 64;
-        std::size_t bytes = n * sizeof(T);
-        const std::size_t align = bytes >= page ? page : small;
-        bytes = (bytes + align - 1) / align * align;
-#if defined(KUZURE_MEMKIND)
-        // Large arrays into the high-bandwidth memory while there is some, then into the ordinary one.
-        if (void* fast = nullptr; align == page && hbw_posix_memalign(&fast, align, bytes) == 0) return static_cast<T*>(fast);
-        else if (align == page) throw std::bad_alloc();
-#endif
-        void* p = std::aligned_alloc(align, bytes ? bytes : align);
-        if (!p) throw std::bad_alloc();
-#if defined(__linux__)
-        if (align == page) madvise(p, bytes, MADV_HUGEPAGE);
-#endif
-        return static_cast<T*>(p);
+        const std::size_t page = std::size_t(1) << 21, line = alignof(T) > 64 ? alignof(T) : 64;
+        const bool large = n * sizeof(T) >= page / 2;
+        const std::size_t align = large ? page : line;
+        // Loops walk many arrays at one index. Arrays that began at the same place of a page would fight for the same few
+        // ways of the first-level cache, so each begins some lines further than the one before.
+        const std::size_t stagger = line * (1 + 3 * detail::allocations++ % (4096 / line));
+        const std::size_t bytes = (n * sizeof(T) + stagger + align - 1) / align * align;
+        char* raw = static_cast<char*>(detail::get(align, bytes, large));
+        if (!raw) throw std::bad_alloc();
+        char* p = raw + stagger;
+        std::memcpy(p - sizeof raw, &raw, sizeof raw);
+        return reinterpret_cast<T*>(p);
     }
-    void deallocate(T* p, [[maybe_unused]] std::size_t n)
+    void deallocate(T* p, std::size_t n)
     {
-#if defined(KUZURE_MEMKIND)
-        if (n * sizeof(T) >= std::size_t(1) << 21) return hbw_free(p);
-#endif
-        std::free(p);
+        char* raw;
+        std::memcpy(&raw, reinterpret_cast<char*>(p) - sizeof raw, sizeof raw);
+        detail::give_back(raw, n * sizeof(T) >= std::size_t(1) << 20);
     }
     /// Leaves new elements as the memory comes: first touch belongs to the thread that writes.
     template <class U> void construct(U* p) noexcept { ::new (static_cast<void*>(p)) U; }

@@ -73,6 +73,7 @@ public:
     /// Change the count; new particles are zero in every present field.
     void resize(Index n)
     {
+        ensure(n >= 0, "a rank cannot hold a negative number of particles, nor more than 2^31");
         for_each_column([&](auto& column) {
             using T = typename std::remove_reference_t<decltype(column)>::value_type;
             const auto old = std::min(size_, n);
@@ -89,7 +90,7 @@ public:
             auto& spare = this->spare<typename std::remove_reference_t<decltype(column)>::value_type>();
             spare.resize(order.size() + padding);
             const Index n = Index(order.size());
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (n > 4096)
             for (Index k = 0; k < n; ++k) spare[k] = column[order[k]];
             std::fill(spare.begin() + n, spare.end(), 0);
             column.swap(spare);

@@ -224,7 +224,7 @@ TEST(Domain, AgreesOnEveryOwner)
     for (std::size_t k = 0; k < blocks.size(); ++k)
         if (int(k) % size == rank)
             mine.push_back(blocks[k]);
-    Domain domain(world(), {0.0, 0.0, 0.0}, {0.5, 0.5, 0.25}, {false, true, false}, {0, 0, 0}, {0, 12, 0});
+    Domain domain(world(), {0.0, 0.0, 0.0}, {0.5, 0.5, 0.25}, {false, true, false}, {0, 0, 0}, {0, 16, 0});
     EXPECT_THROW(domain.owner_of(Block{0, 0, 0}), Broken);
     const CutReport r = domain.cut(mine);
     EXPECT_EQ(r.blocks, int(blocks.size()));
@@ -249,7 +249,7 @@ TEST(Domain, AgreesOnEveryOwner)
             for (int a = 0; a < 3; ++a) {
                 int d = std::abs(domain.blocks()[c][a] - b[a]);
                 if (a == 1)
-                    d %= 24, d = std::min(d, 24 - d);
+                    d %= 32, d = std::min(d, 32 - d);
                 most = std::max(most, d), sum += d * d;
             }
             best = std::min(best, {most, sum, c});
