@@ -4,8 +4,7 @@
 #include <climits>
 #include <cstdio>
 
-namespace kuzure
-{
+namespace kuzure {
 
 using mpi::check;
 
@@ -13,8 +12,7 @@ struct Comm::Handle {
     MPI_Comm comm = MPI_COMM_NULL;
 };
 
-namespace
-{
+namespace {
 
 std::unique_ptr<Comm>& the_world()
 {
@@ -26,8 +24,7 @@ std::unique_ptr<Comm>& the_world()
 mpi::Type long_item(std::size_t bytes, std::size_t piece)
 {
     const std::size_t whole = bytes / piece, rest = bytes % piece;
-    if (whole > std::size_t(INT_MAX))
-        throw MpiFailed("a message of " + std::to_string(bytes) + " bytes is too long");
+    if (whole > std::size_t(INT_MAX)) throw MpiFailed("a message of " + std::to_string(bytes) + " bytes is too long");
     const mpi::Type one = mpi::item_of(piece);
     const int lengths[2] = {int(whole), int(rest)};
     const MPI_Aint starts[2] = {0, MPI_Aint(whole * piece)};
@@ -45,8 +42,7 @@ struct Layout {
     int count;
     Layout(std::size_t bytes, std::size_t piece) : count(int(bytes))
     {
-        if (bytes <= piece)
-            return;
+        if (bytes <= piece) return;
         own = long_item(bytes, piece);
         type = own.type;
         count = 1;
@@ -62,8 +58,7 @@ Environment::Environment(int& argc, char**& argv)
     ensure(!the_world(), "two MPI environments in one program");
     int granted = 0;
     check(MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &granted), "MPI_Init_thread");
-    if (granted < MPI_THREAD_FUNNELED)
-        throw MpiFailed("this MPI library grants no threads (MPI_THREAD_FUNNELED is needed)");
+    if (granted < MPI_THREAD_FUNNELED) throw MpiFailed("this MPI library grants no threads (MPI_THREAD_FUNNELED is needed)");
     // HDF5 works on duplicates of these: they too must return their errors instead of ending the program.
     check(MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
     check(MPI_Comm_set_errhandler(MPI_COMM_SELF, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
@@ -106,8 +101,7 @@ void Comm::abort(int code) const
 // ---------------------------------------------------------------------------------------------
 void Comm::barrier() const { check(MPI_Barrier(handle_->comm), "MPI_Barrier"); }
 
-namespace
-{
+namespace {
 template <class T> void reduce(std::span<T> v, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
 {
     check(MPI_Allreduce(MPI_IN_PLACE, v.data(), int(v.size()), type, op, comm), "MPI_Allreduce");
@@ -143,8 +137,7 @@ std::vector<std::vector<std::byte>> Comm::gather(std::span<const std::byte> mine
     std::vector<std::int64_t> sizes(rank_ == root ? std::size_t(size_) : 0);
     check(MPI_Gather(&n, 1, MPI_INT64_T, sizes.data(), 1, MPI_INT64_T, root, handle_->comm), "MPI_Gather");
     if (rank_ != root) {
-        if (n == 0)
-            return all;
+        if (n == 0) return all;
         const Layout layout(mine.size(), largest_piece);
         check(MPI_Send(mine.data(), layout.count, layout.type, root, mpi::Gather, handle_->comm), "MPI_Send");
         return all;
@@ -152,14 +145,11 @@ std::vector<std::vector<std::byte>> Comm::gather(std::span<const std::byte> mine
     all.resize(std::size_t(size_));
     std::vector<MPI_Request> requests;
     for (int r = 0; r < size_; ++r) {
-        if (r == root || sizes[r] == 0)
-            continue;
+        if (r == root || sizes[r] == 0) continue;
         all[r].resize(std::size_t(sizes[r]));
         const Layout layout(all[r].size(), largest_piece);
         requests.emplace_back();
-        check(MPI_Irecv(all[r].data(), layout.count, layout.type, r, mpi::Gather, handle_->comm,
-                        &requests.back()),
-              "MPI_Irecv");
+        check(MPI_Irecv(all[r].data(), layout.count, layout.type, r, mpi::Gather, handle_->comm, &requests.back()), "MPI_Irecv");
     }
     all[root].assign(mine.begin(), mine.end());
     check(MPI_Waitall(int(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
@@ -172,8 +162,7 @@ void Comm::allgather_bytes(const void* mine, void* all, std::size_t item) const
     check(MPI_Allgather(mine, 1, type.type, all, 1, type.type, handle_->comm), "MPI_Allgather");
 }
 
-void Comm::allgather_bytes(const void* mine, void* all, std::size_t item,
-                           std::span<const std::int64_t> counts) const
+void Comm::allgather_bytes(const void* mine, void* all, std::size_t item, std::span<const std::int64_t> counts) const
 {
     std::vector<int> count, start;
     std::int64_t total = 0;
@@ -181,13 +170,10 @@ void Comm::allgather_bytes(const void* mine, void* all, std::size_t item,
         count.push_back(int(c));
         start.push_back(int(total));
         total += c;
-        if (total > INT_MAX)
-            throw MpiFailed("an all-gather of more than 2^31 items");
+        if (total > INT_MAX) throw MpiFailed("an all-gather of more than 2^31 items");
     }
     const mpi::Type type = mpi::item_of(item);
-    check(MPI_Allgatherv(mine, count[rank_], type.type, all, count.data(), start.data(), type.type,
-                         handle_->comm),
-          "MPI_Allgatherv");
+    check(MPI_Allgatherv(mine, count[rank_], type.type, all, count.data(), start.data(), type.type, handle_->comm), "MPI_Allgatherv");
 }
 
 // ---- each to whom it likes
@@ -208,9 +194,7 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
         }
         const Layout layout(m.bytes.size(), piece);
         sends.emplace_back();
-        check(
-            MPI_Issend(m.bytes.data(), layout.count, layout.type, m.rank, tag, handle_->comm, &sends.back()),
-            "MPI_Issend");
+        check(MPI_Issend(m.bytes.data(), layout.count, layout.type, m.rank, tag, handle_->comm, &sends.back()), "MPI_Issend");
     }
     // Synchronous sends complete when they are received: once all of mine are, I enter the barrier, and once
     // everybody is in it, no message is under way.
@@ -226,16 +210,14 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
             check(MPI_Get_elements_x(&status, MPI_BYTE, &bytes), "MPI_Get_elements_x");
             Message m{status.MPI_SOURCE, std::vector<std::byte>(std::size_t(bytes))};
             const Layout layout(m.bytes.size(), piece);
-            check(MPI_Mrecv(m.bytes.data(), layout.count, layout.type, &message, MPI_STATUS_IGNORE),
-                  "MPI_Mrecv");
+            check(MPI_Mrecv(m.bytes.data(), layout.count, layout.type, &message, MPI_STATUS_IGNORE), "MPI_Mrecv");
             in.push_back(std::move(m));
         } else if (in_barrier) {
             check(MPI_Test(&all_done, &done, MPI_STATUS_IGNORE), "MPI_Test");
         } else {
             int sent = 0;
             check(MPI_Testall(int(sends.size()), sends.data(), &sent, MPI_STATUSES_IGNORE), "MPI_Testall");
-            if (!sent)
-                continue;
+            if (!sent) continue;
             check(MPI_Ibarrier(handle_->comm, &all_done), "MPI_Ibarrier");
             in_barrier = true;
         }
@@ -247,8 +229,7 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
 NodePlace Comm::node_place() const
 {
     MPI_Comm shared = MPI_COMM_NULL;
-    check(MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &shared),
-          "MPI_Comm_split_type");
+    check(MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &shared), "MPI_Comm_split_type");
     NodePlace place{};
     int lowest = rank_;
     check(MPI_Comm_rank(shared, &place.rank), "MPI_Comm_rank");

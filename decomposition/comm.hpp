@@ -7,8 +7,7 @@
 #include <memory>
 #include <type_traits>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// An MPI call failed. The message names the call and MPI's own words.
 struct MpiFailed : std::runtime_error {
@@ -18,9 +17,8 @@ struct MpiFailed : std::runtime_error {
 /// MPI from construction to destruction, with Comm::world() in between. One per program; throws MpiFailed
 /// where MPI does not start or grants less than MPI_THREAD_FUNNELED. A rank that fails alone must abort():
 /// finalizing waits.
-class Environment
-{
-  public:
+class Environment {
+public:
     Environment(int& argc, char**& argv);
     Environment(const Environment&) = delete;
     ~Environment();
@@ -42,9 +40,8 @@ struct NodePlace {
     int node, nodes;
 };
 
-class Comm final : public Team
-{
-  public:
+class Comm final : public Team {
+public:
     using Team::broadcast;
     using Team::max;
     using Team::min;
@@ -88,8 +85,7 @@ class Comm final : public Team
         for (const Message& m : exchange(std::move(bytes))) {
             ensure(m.bytes.size() % sizeof(T) == 0, "a typed message holds a fraction of an item");
             in.push_back({m.rank, std::vector<T>(m.bytes.size() / sizeof(T))});
-            if (!m.bytes.empty())
-                std::memcpy(in.back().items.data(), m.bytes.data(), m.bytes.size());
+            if (!m.bytes.empty()) std::memcpy(in.back().items.data(), m.bytes.data(), m.bytes.size());
         }
         return in;
     }
@@ -107,8 +103,7 @@ class Comm final : public Team
         static_assert(std::is_trivially_copyable_v<T>);
         const auto counts = allgather(std::int64_t(mine.size()));
         std::int64_t total = 0;
-        for (const auto c : counts)
-            total += c;
+        for (const auto c : counts) total += c;
         std::vector<T> all(static_cast<std::size_t>(total));
         allgather_bytes(mine.data(), all.data(), sizeof(T), counts);
         return all;
@@ -118,13 +113,12 @@ class Comm final : public Team
     /// End every rank of the program with this exit code, without waiting for them.
     [[noreturn]] void abort(int code) const;
 
-  private:
+private:
     friend class Environment;
     struct Handle;
     explicit Comm(std::unique_ptr<Handle>);
     void allgather_bytes(const void* mine, void* all, std::size_t item) const;
-    void allgather_bytes(const void* mine, void* all, std::size_t item,
-                         std::span<const std::int64_t> counts) const;
+    void allgather_bytes(const void* mine, void* all, std::size_t item, std::span<const std::int64_t> counts) const;
 
     std::unique_ptr<Handle> handle_;
     int rank_ = 0, size_ = 1;

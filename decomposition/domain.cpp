@@ -6,28 +6,22 @@
 #include <limits>
 #include <map>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 std::array<double, 3> axes(Vector v) { return {v.x, v.y, v.z}; }
 
 std::string lost_at(Vector x)
 {
-    return fmt::format(
-        "a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into blocks: the run "
-        "has blown up; try a smaller time step",
-        x.x, x.y, x.z);
+    return fmt::format("a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into blocks: the run "
+                       "has blown up; try a smaller time step",
+                       x.x, x.y, x.z);
 }
 
 /// Particles below which threads cost more than they bring.
 constexpr Index parallel = 4096;
 
-double now()
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 // ---- bytes of several lists in one message
 // -------------------------------------------------------------------------
@@ -43,8 +37,7 @@ template <class T> std::vector<T> take(std::span<const std::byte>& from)
     std::uint64_t n = 0;
     std::memcpy(&n, from.data(), sizeof n);
     std::vector<T> items(n);
-    if (n)
-        std::memcpy(items.data(), from.data() + sizeof n, n * sizeof(T));
+    if (n) std::memcpy(items.data(), from.data() + sizeof n, n * sizeof(T));
     from = from.subspan(sizeof n + n * sizeof(T));
     return items;
 }
@@ -53,21 +46,18 @@ template <class T> std::vector<T> take(std::span<const std::byte>& from)
 
 // ---- blocks
 // --------------------------------------------------------------------------------------------------------
-Domain::Domain(const Comm& comm, Vector origin, Vector block_size, std::array<bool, 3> periodic,
-               Vector period_low, Vector period_length)
+Domain::Domain(const Comm& comm, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low, Vector period_length)
     : comm_(comm), origin_(origin), size_(block_size), period_low_(period_low), period_length_(period_length)
 {
     for (int a = 0; a < 3; ++a) {
         const double size = axes(size_)[a], length = axes(period_length_)[a];
         ensure(size > 0 && std::isfinite(size), "the size of a block is not positive");
-        if (!periodic[a])
-            continue;
+        if (!periodic[a]) continue;
         const double n = std::round(length / size);
         if (!(n >= 1 && n < block_limit && std::abs(n * size - length) <= 1e-9 * length))
-            throw BadInput(
-                fmt::format("the period along {} ({} m) is not a whole number of blocks of {} m: choose a "
-                            "block size that divides it",
-                            "xyz"[a], length, size));
+            throw BadInput(fmt::format("the period along {} ({} m) is not a whole number of blocks of {} m: choose a "
+                                       "block size that divides it",
+                                       "xyz"[a], length, size));
         period_[a] = std::int32_t(n);
     }
 }
@@ -77,8 +67,7 @@ bool Domain::raw_block(Vector x, Block& b) const
     const double k[3] = {std::floor((x.x - origin_.x) / size_.x), std::floor((x.y - origin_.y) / size_.y),
                          std::floor((x.z - origin_.z) / size_.z)};
     for (int a = 0; a < 3; ++a) {
-        if (!(k[a] >= -block_limit && k[a] < block_limit))
-            return false;
+        if (!(k[a] >= -block_limit && k[a] < block_limit)) return false;
         b[a] = std::int32_t(k[a]);
     }
     return true;
@@ -87,11 +76,9 @@ bool Domain::raw_block(Vector x, Block& b) const
 Block Domain::wrapped(Block b) const
 {
     for (int a = 0; a < 3; ++a) {
-        if (!period_[a])
-            continue;
+        if (!period_[a]) continue;
         b[a] %= period_[a];
-        if (b[a] < 0)
-            b[a] += period_[a];
+        if (b[a] < 0) b[a] += period_[a];
     }
     return b;
 }
@@ -99,26 +86,22 @@ Block Domain::wrapped(Block b) const
 Block Domain::block_of(Vector x) const
 {
     Block b;
-    if (!raw_block(x, b))
-        throw NumbersFailed(lost_at(x));
+    if (!raw_block(x, b)) throw NumbersFailed(lost_at(x));
     return wrapped(b);
 }
 
 void Domain::stop_if_lost(bool mine, Vector x) const
 {
     const int rank = int(comm_.max(std::int64_t(mine ? comm_.rank() : -1)));
-    if (rank >= 0)
-        throw NumbersFailed(comm_.broadcast(mine ? lost_at(x) : std::string(), rank));
+    if (rank >= 0) throw NumbersFailed(comm_.broadcast(mine ? lost_at(x) : std::string(), rank));
 }
 
 int Domain::owner_of(const Block& asked) const
 {
     ensure(is_cut_, "a domain is asked for owners before it is cut");
-    if (block_.empty())
-        return 0;
+    if (block_.empty()) return 0;
     const Block b = wrapped(asked);
-    if (const int k = index_[b]; k >= 0)
-        return owner_[k];
+    if (const int k = index_[b]; k >= 0) return owner_[k];
 
     // (largest difference, squared distance, lexicographic place): the least wins.
     using Rank = std::tuple<std::int64_t, std::int64_t, int>;
@@ -126,8 +109,7 @@ int Domain::owner_of(const Block& asked) const
         std::int64_t largest = 0, squared = 0;
         for (int a = 0; a < 3; ++a) {
             std::int64_t d = std::abs(std::int64_t(block_[k][a]) - b[a]);
-            if (period_[a])
-                d = std::min(d, period_[a] - d);
+            if (period_[a]) d = std::min(d, period_[a] - d);
             largest = std::max(largest, d);
             squared += d * d;
         }
@@ -142,15 +124,12 @@ int Domain::owner_of(const Block& asked) const
                 for (int l = -s; l <= s; l += std::abs(i) == s || std::abs(j) == s ? 1 : 2 * s) {
                     const Block near = wrapped({b[0] + i, b[1] + j, b[2] + l});
                     bool inside = true;
-                    for (const auto c : near)
-                        inside = inside && c >= -block_limit && c < block_limit;
+                    for (const auto c : near) inside = inside && c >= -block_limit && c < block_limit;
                     const int k = inside ? index_[near] : -1;
-                    if (k >= 0)
-                        best = std::min(best, rank_of(k));
+                    if (k >= 0) best = std::min(best, rank_of(k));
                 }
     if (best == none)
-        for (int k = 0; k < int(block_.size()); ++k)
-            best = std::min(best, rank_of(k));
+        for (int k = 0; k < int(block_.size()); ++k) best = std::min(best, rank_of(k));
     return owner_[std::get<2>(best)];
 }
 
@@ -169,30 +148,25 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
             for (int r = 0; r < comm_.size(); ++r) {
                 const std::size_t n = lists[r].size() / sizeof(BlockWork), at = all.size();
                 all.resize(at + n);
-                if (n)
-                    std::memcpy(&all[at], lists[r].data(), n * sizeof(BlockWork));
+                if (n) std::memcpy(&all[at], lists[r].data(), n * sizeof(BlockWork));
                 lister.resize(at + n, r);
             }
             BlockGrid grid;
             grid.period = period_;
             grid.row_bytes = halo.row_bytes;
             if (halo.reach > 0)
-                for (int a = 0; a < 3; ++a)
-                    grid.reach[a] = halo.reach / axes(size_)[a];
+                for (int a = 0; a < 3; ++a) grid.reach[a] = halo.reach / axes(size_)[a];
             const BlockGraph g = block_graph(all, grid);
 
             // A block was where most of its work was listed.
             BlockIndex index;
             index.reserve(g.block.size());
-            for (int b = 0; b < g.size(); ++b)
-                index.set(g.block[b], b);
+            for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
             std::vector<std::map<int, double>> shares(g.block.size());
-            for (std::size_t k = 0; k < all.size(); ++k)
-                shares[index[all[k].block]][lister[k]] += all[k].work;
+            for (std::size_t k = 0; k < all.size(); ++k) shares[index[all[k].block]][lister[k]] += all[k].work;
             std::vector<int> previous(g.block.size(), -1);
             for (int b = 0; b < g.size(); ++b)
-                previous[b] =
-                    std::ranges::max_element(shares[b], {}, [](const auto& s) { return s.second; })->first;
+                previous[b] = std::ranges::max_element(shares[b], {}, [](const auto& s) { return s.second; })->first;
 
             const std::vector<int> owner = partition(g, comm_.size(), method, &previous);
             const CutReport r = describe(g, owner, comm_.size());
@@ -233,8 +207,7 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
 
     index_ = {};
     index_.reserve(block_.size());
-    for (int b = 0; b < int(block_.size()); ++b)
-        index_.set(block_[b], b);
+    for (int b = 0; b < int(block_.size()); ++b) index_.set(block_[b], b);
     is_cut_ = true;
     r.seconds = comm_.max(now() - start);
     return r;
@@ -260,8 +233,7 @@ Domain::Moved Domain::migrate(Particles& p) const
                 lost = std::max(lost, i);
                 continue;
             }
-            if (last_owner < 0 || b != last)
-                last = b, last_owner = owner_of(b);
+            if (last_owner < 0 || b != last) last = b, last_owner = owner_of(b);
             owner[i] = last_owner;
         }
     }
@@ -271,10 +243,8 @@ Domain::Moved Domain::migrate(Particles& p) const
     std::vector<Index> stay;
     stay.reserve(n);
     for (Index i = 0; i < n; ++i) {
-        if (owner[i] == comm_.rank())
-            stay.push_back(i);
-        else
-            leaving[owner[i]].push_back(i);
+        if (owner[i] == comm_.rank()) stay.push_back(i);
+        else leaving[owner[i]].push_back(i);
     }
     Moved moved;
     std::vector<Message> out;
@@ -284,11 +254,9 @@ Domain::Moved Domain::migrate(Particles& p) const
         p.pack(which, out.back().bytes);
     }
     const auto in = comm_.exchange(std::move(out));
-    if (moved.left)
-        p.gather(stay);
+    if (moved.left) p.gather(stay);
     for (const Message& m : in) {
-        ensure(p.size() + std::int64_t(m.bytes.size() / p.bytes_per_particle()) <
-                   std::numeric_limits<Index>::max(),
+        ensure(p.size() + std::int64_t(m.bytes.size() / p.bytes_per_particle()) < std::numeric_limits<Index>::max(),
                "more than 2^31 particles on one rank");
         p.unpack(m.bytes);
     }
@@ -298,8 +266,7 @@ Domain::Moved Domain::migrate(Particles& p) const
 
 // ---- who needs to see whom
 // -----------------------------------------------------------------------------------------
-namespace
-{
+namespace {
 
 struct Bounds {
     double low[3], high[3];
@@ -311,8 +278,7 @@ struct Bounds {
     bool empty() const { return low[0] > high[0]; }
     void add(const double* l, const double* h)
     {
-        for (int a = 0; a < 3; ++a)
-            low[a] = std::min(low[a], l[a]), high[a] = std::max(high[a], h[a]);
+        for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], l[a]), high[a] = std::max(high[a], h[a]);
     }
 };
 
@@ -337,15 +303,11 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
         const int d[3] = {s % 3 - 1, s / 3 % 3 - 1, s / 9 - 1};
         plan.shift[s] = {d[0] * period_length_.x, d[1] * period_length_.y, d[2] * period_length_.z};
         bool possible = true;
-        for (int a = 0; a < 3; ++a)
-            possible = possible && (d[a] == 0 || period_[a] > 0);
-        if (!possible)
-            plan.shift[s] = {};
-        else
-            shifts.push_back(s);
+        for (int a = 0; a < 3; ++a) possible = possible && (d[a] == 0 || period_[a] > 0);
+        if (!possible) plan.shift[s] = {};
+        else shifts.push_back(s);
     }
-    for (int a = 0; a < 3; ++a)
-        ensure(period_[a] == 0 || reach <= axes(period_length_)[a], "the halo reaches further than a period");
+    for (int a = 0; a < 3; ++a) ensure(period_[a] == 0 || reach <= axes(period_length_)[a], "the halo reaches further than a period");
     const auto shift = [&](int s) { return axes(plan.shift[s]); };
 
     // The particles by block, and the box that each block's particles fill. Blocks are not wrapped here: one
@@ -355,9 +317,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     bool outside = false;
     Index lost = -1;
     const auto low = axes(period_low_), length = axes(period_length_);
-#pragma omp parallel for schedule(static) reduction(max                                                      \
-                                                    : largest, lost) reduction(||                            \
-                                                                               : outside) if (n > parallel)
+#pragma omp parallel for schedule(static) reduction(max : largest, lost) reduction(|| : outside) if (n > parallel)
     for (Index i = 0; i < n; ++i) {
         Block b;
         if (!raw_block(x[i], b)) {
@@ -369,8 +329,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             const double c = x.column[a][i];
             largest = std::max(largest, std::abs(c));
             const double slack = 1e-9 * length[a];
-            if (period_[a])
-                outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
+            if (period_[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
         }
     }
     stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
@@ -385,18 +344,15 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             group[i] = group[i - 1];
         } else {
             group[i] = local.try_emplace(key[i], int(box.size())).first->second;
-            if (group[i] == int(box.size()))
-                box.push_back(Bounds::none()), first.push_back(0);
+            if (group[i] == int(box.size())) box.push_back(Bounds::none()), first.push_back(0);
         }
         ++first[group[i] + 1];
     }
-    for (std::size_t g = 1; g < first.size(); ++g)
-        first[g] += first[g - 1];
+    for (std::size_t g = 1; g < first.size(); ++g) first[g] += first[g - 1];
     std::vector<Index> member(n);
     {
         auto next = first;
-        for (Index i = 0; i < n; ++i)
-            member[next[group[i]]++] = i;
+        for (Index i = 0; i < n; ++i) member[next[group[i]]++] = i;
     }
     const int n_boxes = int(box.size());
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
@@ -407,8 +363,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             box[g].add(at, at);
         }
     Bounds whole = Bounds::none();
-    for (const auto& b : box)
-        whole.add(b.low, b.high);
+    for (const auto& b : box) whole.add(b.low, b.high);
 
     // Rounding must not lose a pair that the solver, adding the shift on the other side, finds just inside.
     const double extent = std::max({largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])});
@@ -418,21 +373,16 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     const auto wholes = comm_.allgather(whole);
     std::vector<Parcel<Bounds>> out;
     for (int r = 0; r < comm_.size(); ++r) {
-        if (whole.empty() || wholes[r].empty())
-            continue;
+        if (whole.empty() || wholes[r].empty()) continue;
         Parcel<Bounds> p{r, {}};
         if (r == comm_.rank()) {
-            if (shifts.size() > 1)
-                p.items = box;
+            if (shifts.size() > 1) p.items = box;
         } else {
             for (const auto& b : box)
-                if (std::ranges::any_of(shifts, [&](int s) {
-                        return squared_distance(b, shift(s).data(), wholes[r]) <= reach2;
-                    }))
+                if (std::ranges::any_of(shifts, [&](int s) { return squared_distance(b, shift(s).data(), wholes[r]) <= reach2; }))
                     p.items.push_back(b);
         }
-        if (!p.items.empty())
-            out.push_back(std::move(p));
+        if (!p.items.empty()) out.push_back(std::move(p));
     }
     const auto theirs = comm_.exchange(out);
 
@@ -447,24 +397,19 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
         for (int peer = 0; peer < int(theirs.size()); ++peer) {
             const auto& them = theirs[peer];
             for (const int s : shifts) {
-                if (them.rank == comm_.rank() && s == HaloPlan::no_shift)
-                    continue;
+                if (them.rank == comm_.rank() && s == HaloPlan::no_shift) continue;
                 const auto d = shift(s);
-                if (squared_distance(box[g], d.data(), wholes[them.rank]) > reach2)
-                    continue;
+                if (squared_distance(box[g], d.data(), wholes[them.rank]) > reach2) continue;
                 near.clear();
                 for (const auto& b : them.items)
-                    if (squared_distance(box[g], d.data(), b) <= reach2)
-                        near.push_back(&b);
-                if (near.empty())
-                    continue;
+                    if (squared_distance(box[g], d.data(), b) <= reach2) near.push_back(&b);
+                if (near.empty()) continue;
                 for (Index k = first[g]; k < first[g + 1]; ++k) {
                     const Index i = member[k];
                     const Vector v = x[i];
                     const Bounds at{{v.x, v.y, v.z}, {v.x, v.y, v.z}};
                     for (const Bounds*& b : near) {
-                        if (squared_distance(at, d.data(), *b) > reach2)
-                            continue;
+                        if (squared_distance(at, d.data(), *b) > reach2) continue;
                         found[g].push_back({peer, {i, s}});
                         std::swap(b, near.front()); // the next particle is probably near the same box
                         break;
@@ -473,14 +418,11 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             }
         }
     }
-    for (const auto& them : theirs)
-        plan.peers.push_back({them.rank, {}});
+    for (const auto& them : theirs) plan.peers.push_back({them.rank, {}});
     for (const auto& f : found)
-        for (const Entry& e : f)
-            plan.peers[e.peer].sends.push_back(e.send);
+        for (const Entry& e : f) plan.peers[e.peer].sends.push_back(e.send);
     std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
-    for (auto& p : plan.peers)
-        std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
+    for (auto& p : plan.peers) std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
     return plan;
 }
 

@@ -7,8 +7,7 @@
 #include "solver/core/particles.hpp"
 #include <string>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// How a cut weighs the halo: its reach in m (0: a quarter of a block) and the bytes of a ghost's record.
 struct HaloCost {
@@ -16,13 +15,11 @@ struct HaloCost {
     double row_bytes = 128;
 };
 
-class Domain
-{
-  public:
+class Domain {
+public:
     /// Blocks of this size from this origin (m); on a periodic axis the period must hold a whole number of
     /// blocks, else BadInput.
-    Domain(const Comm&, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low,
-           Vector period_length);
+    Domain(const Comm&, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low, Vector period_length);
 
     /// floor((x - origin)/size) by axis, wrapped to 0 .. n-1 on periodic axes. Throws NumbersFailed for a
     /// position that is not finite or more than 2^20 blocks away.
@@ -51,10 +48,7 @@ class Domain
     /// its block held soil at the last cut. On periodic axes positions must lie in [low, low + length] and
     /// reach <= length.
     HaloPlan plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const;
-    HaloPlan plan_halo(const Particles& p, double reach) const
-    {
-        return plan_halo(p[field::position], p.size(), reach);
-    }
+    HaloPlan plan_halo(const Particles& p, double reach) const { return plan_halo(p[field::position], p.size(), reach); }
 
     const Comm& comm() const { return comm_; }
     /// Blocks that held soil at the last cut, in lexicographic order, and their owners.
@@ -63,7 +57,7 @@ class Domain
     /// Blocks per period by axis; 0 where open.
     const std::array<std::int32_t, 3>& period() const { return period_; }
 
-  private:
+private:
     /// Without the wrap; nothing where block_of() would throw.
     bool raw_block(Vector x, Block& b) const;
     Block wrapped(Block) const;

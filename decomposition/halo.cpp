@@ -4,8 +4,7 @@
 #include <limits>
 #include <numeric>
 
-namespace kuzure
-{
+namespace kuzure {
 
 using mpi::check;
 
@@ -30,14 +29,12 @@ struct Halo::Impl {
     ~Impl()
     {
         for (auto& r : requests)
-            if (r != MPI_REQUEST_NULL)
-                MPI_Request_free(&r);
+            if (r != MPI_REQUEST_NULL) MPI_Request_free(&r);
     }
     void note(int n)
     {
         for (int k = 0; k < n; ++k) {
-            if (finished[k] >= n_receives)
-                continue;
+            if (finished[k] >= n_receives) continue;
             ready.push_back(in_of_receive[finished[k]]);
             --outstanding;
         }
@@ -50,8 +47,7 @@ Halo& Halo::operator=(Halo&& other) noexcept
 {
     // A refresh that is still under way (an exception passes by) owns its buffers until MPI ends: leave them
     // to it.
-    if (impl_ && impl_->in_flight)
-        static_cast<void>(impl_.release());
+    if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
     impl_ = std::move(other.impl_);
     out_ = std::move(other.out_);
     in_ = std::move(other.in_);
@@ -65,8 +61,7 @@ Halo& Halo::operator=(Halo&& other) noexcept
 
 Halo::~Halo()
 {
-    if (impl_ && impl_->in_flight)
-        static_cast<void>(impl_.release());
+    if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
 }
 
 Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
@@ -81,17 +76,13 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
     std::int64_t n_out = 0, n_in = 0;
     for (const auto& p : m.plan.peers) {
         const auto n = std::int64_t(p.sends.size());
-        if (n == 0)
-            continue;
+        if (n == 0) continue;
         counts.push_back({p.rank, {n}});
-        if (p.rank != comm.rank())
-            n_out += n;
+        if (p.rank != comm.rank()) n_out += n;
     }
     counts = comm.exchange(counts);
-    for (const auto& c : counts)
-        n_in += c.items.at(0);
-    ensure(n_in <= std::numeric_limits<Index>::max() && n_out <= std::numeric_limits<Index>::max(),
-           "more than 2^31 ghosts on one rank");
+    for (const auto& c : counts) n_in += c.items.at(0);
+    ensure(n_in <= std::numeric_limits<Index>::max() && n_out <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
     m.n_ghosts = Index(n_in);
     m.outgoing.resize(std::size_t(n_out) * row_bytes);
     m.arrivals.resize(std::size_t(n_in) * row_bytes);
@@ -104,9 +95,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
         } else {
             m.in_of_receive.push_back(int(in_.size()));
             m.requests.push_back(MPI_REQUEST_NULL);
-            check(
-                MPI_Recv_init(in.rows, in.n, m.row.type, c.rank, mpi::Refresh, mpi_comm, &m.requests.back()),
-                "MPI_Recv_init");
+            check(MPI_Recv_init(in.rows, in.n, m.row.type, c.rank, mpi::Refresh, mpi_comm, &m.requests.back()), "MPI_Recv_init");
         }
         in_.push_back(in);
         first += in.n;
@@ -115,8 +104,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
 
     std::byte* rows = m.outgoing.data();
     for (const auto& p : m.plan.peers) {
-        if (p.sends.empty())
-            continue;
+        if (p.sends.empty()) continue;
         Out out{p.sends.data(), Index(p.sends.size()), rows};
         if (p.rank == comm.rank()) {
             out.rows = in_[m.self].rows;
@@ -125,9 +113,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
             rows += std::size_t(out.n) * row_bytes;
             m.send_of_out.push_back(int(m.requests.size()));
             m.requests.push_back(MPI_REQUEST_NULL);
-            check(MPI_Send_init(out.rows, out.n, m.row.type, p.rank, mpi::Refresh, mpi_comm,
-                                &m.requests.back()),
-                  "MPI_Send_init");
+            check(MPI_Send_init(out.rows, out.n, m.row.type, p.rank, mpi::Refresh, mpi_comm, &m.requests.back()), "MPI_Send_init");
             bytes_ += std::int64_t(out.n) * std::int64_t(row_bytes);
             ++messages_;
         }
@@ -169,30 +155,24 @@ void Halo::start_receives()
     m.in_flight = true;
     m.outstanding = m.n_receives;
     m.ready.clear();
-    if (m.self >= 0)
-        m.ready.push_back(m.self);
-    if (m.n_receives)
-        check(MPI_Startall(m.n_receives, m.requests.data()), "MPI_Startall");
+    if (m.self >= 0) m.ready.push_back(m.self);
+    if (m.n_receives) check(MPI_Startall(m.n_receives, m.requests.data()), "MPI_Startall");
 }
 
 void Halo::start_send(int peer)
 {
     Impl& m = *impl_;
     const int k = m.send_of_out[peer];
-    if (k >= 0)
-        check(MPI_Start(&m.requests[k]), "MPI_Start");
+    if (k >= 0) check(MPI_Start(&m.requests[k]), "MPI_Start");
 }
 
 void Halo::progress()
 {
     Impl& m = *impl_;
-    if (!m.in_flight || m.requests.empty())
-        return;
+    if (!m.in_flight || m.requests.empty()) return;
     int n = 0;
-    check(MPI_Testsome(int(m.requests.size()), m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE),
-          "MPI_Testsome");
-    if (n != MPI_UNDEFINED)
-        m.note(n);
+    check(MPI_Testsome(int(m.requests.size()), m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Testsome");
+    if (n != MPI_UNDEFINED) m.note(n);
 }
 
 int Halo::next_arrival()
@@ -201,13 +181,11 @@ int Halo::next_arrival()
     ensure(m.in_flight, "a refresh ends that was not begun");
     while (m.ready.empty() && m.outstanding > 0) {
         int n = 0;
-        check(MPI_Waitsome(m.n_receives, m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE),
-              "MPI_Waitsome");
+        check(MPI_Waitsome(m.n_receives, m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Waitsome");
         ensure(n != MPI_UNDEFINED, "a halo waits for messages that are not under way");
         m.note(n);
     }
-    if (m.ready.empty())
-        return -1;
+    if (m.ready.empty()) return -1;
     const int peer = m.ready.back();
     m.ready.pop_back();
     return peer;

@@ -6,8 +6,7 @@
 #include "solver/core/tensor.hpp"
 #include <array>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// What is sent to whom until the next rebuild.
 struct HaloPlan {
@@ -33,9 +32,8 @@ struct Ghost {
 
 /// The exchange of one plan. Rows arrive by sending rank, those of one rank in its plan's order. Main thread
 /// only.
-class Halo
-{
-  public:
+class Halo {
+public:
     /// Collective. The plan's counts are exchanged; rows have `row_bytes` bytes, packed without gaps.
     Halo(const Comm&, HaloPlan, std::size_t row_bytes);
     Halo(Halo&&) noexcept;
@@ -55,16 +53,12 @@ class Halo
         for (const auto& peer : plan().peers) {
             Parcel<Row> p{peer.rank, {}};
             p.items.reserve(peer.sends.size());
-            for (const auto& s : peer.sends)
-                p.items.push_back(make(s.owned, plan().shift[s.shift]));
-            if (!p.items.empty())
-                out.push_back(std::move(p));
+            for (const auto& s : peer.sends) p.items.push_back(make(s.owned, plan().shift[s.shift]));
+            if (!p.items.empty()) out.push_back(std::move(p));
         }
         std::vector<Row> rows;
-        for (const auto& p : comm().exchange(out))
-            rows.insert(rows.end(), p.items.begin(), p.items.end());
-        ensure(rows.size() == std::size_t(n_ghosts()),
-               "a halo delivers another number of ghosts than planned");
+        for (const auto& p : comm().exchange(out)) rows.insert(rows.end(), p.items.begin(), p.items.end());
+        ensure(rows.size() == std::size_t(n_ghosts()), "a halo delivers another number of ghosts than planned");
         return rows;
     }
     /// Where each ghost was sorted (shifted), its id and soil (0 where the store has no soil column).
@@ -84,8 +78,7 @@ class Halo
             const std::size_t bytes = row_bytes_;
             const auto& shift = plan().shift;
 #pragma omp parallel for schedule(static) if (out.n > parallel_rows)
-            for (Index k = 0; k < out.n; ++k)
-                copy(out.sends[k].owned, shift[out.sends[k].shift], out.rows + std::size_t(k) * bytes);
+            for (Index k = 0; k < out.n; ++k) copy(out.sends[k].owned, shift[out.sends[k].shift], out.rows + std::size_t(k) * bytes);
             start_send(peer);
         }
     }
@@ -100,8 +93,7 @@ class Halo
             const std::size_t bytes = row_bytes_;
             const Index* slot = slot_.data() + in.first;
 #pragma omp parallel for schedule(static) if (in.n > parallel_rows)
-            for (Index k = 0; k < in.n; ++k)
-                put(slot[k], static_cast<const std::byte*>(in.rows) + std::size_t(k) * bytes);
+            for (Index k = 0; k < in.n; ++k) put(slot[k], static_cast<const std::byte*>(in.rows) + std::size_t(k) * bytes);
         }
         finish();
     }
@@ -112,7 +104,7 @@ class Halo
     int messages_per_refresh() const { return messages_; }
     std::int64_t refreshes() const { return refreshes_; }
 
-  private:
+private:
     static constexpr Index parallel_rows = 2048;
     struct Out {
         const HaloPlan::Send* sends;

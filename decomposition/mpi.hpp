@@ -4,16 +4,14 @@
 #include <mpi.h>
 #include <string>
 
-namespace kuzure::mpi
-{
+namespace kuzure::mpi {
 
 /// exchange() alternates between the first two; the others are point to point.
 enum Tag { Even = 0, Odd = 1, Gather = 2, Refresh = 3 };
 
 inline void check(int code, const char* call)
 {
-    if (code == MPI_SUCCESS)
-        return;
+    if (code == MPI_SUCCESS) return;
     char text[MPI_MAX_ERROR_STRING];
     int n = 0;
     MPI_Error_string(code, text, &n);
@@ -32,8 +30,7 @@ struct Type {
     }
     ~Type()
     {
-        if (type != MPI_DATATYPE_NULL)
-            MPI_Type_free(&type);
+        if (type != MPI_DATATYPE_NULL) MPI_Type_free(&type);
     }
 };
 /// `bytes` contiguous bytes as one item.

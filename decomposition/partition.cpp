@@ -6,8 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace kuzure
-{
+namespace kuzure {
 
 const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curve"; }
 
@@ -17,10 +16,8 @@ BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
 {
     for (const auto& b : given) {
         for (int a = 0; a < 3; ++a) {
-            ensure(b.block[a] >= -block_limit && b.block[a] < block_limit,
-                   "a block lies beyond the block limit");
-            ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]),
-                   "a block lies outside its period");
+            ensure(b.block[a] >= -block_limit && b.block[a] < block_limit, "a block lies beyond the block limit");
+            ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]), "a block lies outside its period");
         }
         ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
                "a block's work or particle count is negative or not a number");
@@ -42,29 +39,23 @@ BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
 
     BlockIndex index;
     index.reserve(g.block.size());
-    for (int b = 0; b < g.size(); ++b)
-        index.set(g.block[b], b);
+    for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
     for (int b = 0; b < g.size(); ++b) {
         g.first.push_back(g.link.size());
         for (int code = 0; code < 27; ++code) {
-            const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1),
-                                               std::int8_t(code % 3 - 1)};
-            if (code == 13)
-                continue;
+            const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
+            if (code == 13) continue;
             Block there = g.block[b];
             double share = 1; // of a block's particles within reach of the other block
             bool inside = true;
             for (int a = 0; a < 3; ++a) {
                 there[a] += d[a];
-                if (grid.period[a])
-                    there[a] = (there[a] + grid.period[a]) % grid.period[a];
+                if (grid.period[a]) there[a] = (there[a] + grid.period[a]) % grid.period[a];
                 inside = inside && there[a] >= -block_limit && there[a] < block_limit;
-                if (d[a])
-                    share *= std::min(1.0, grid.reach[a]);
+                if (d[a]) share *= std::min(1.0, grid.reach[a]);
             }
             const int n = inside ? index[there] : -1;
-            if (n >= 0)
-                g.link.push_back({n, d, share * grid.row_bytes * (g.particles[b] + g.particles[n])});
+            if (n >= 0) g.link.push_back({n, d, share * grid.row_bytes * (g.particles[b] + g.particles[n])});
         }
     }
     g.first.push_back(g.link.size());
@@ -73,8 +64,7 @@ BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
 
 // ---- what a cut is worth
 // -------------------------------------------------------------------------------------------
-namespace
-{
+namespace {
 
 /// A block seen along one axis: the shares of it within reach of its low face, of its high face, of both, of
 /// none.
@@ -85,8 +75,7 @@ struct Layer {
 std::array<Layer, 3> layers(double reach)
 {
     const double r = std::min(1.0, reach);
-    if (r <= 0.5)
-        return {{{r, true, false}, {1 - 2 * r, false, false}, {r, false, true}}};
+    if (r <= 0.5) return {{{r, true, false}, {1 - 2 * r, false, false}, {r, false, true}}};
     return {{{1 - r, true, false}, {2 * r - 1, true, true}, {1 - r, false, true}}};
 }
 
@@ -107,8 +96,7 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
         r.particles[part[b]] += g.particles[b];
     }
     const double total = std::accumulate(r.work.begin(), r.work.end(), 0.0);
-    if (total > 0)
-        r.imbalance = *std::ranges::max_element(r.work) * parts / total;
+    if (total > 0) r.imbalance = *std::ranges::max_element(r.work) * parts / total;
 
     const auto x = layers(g.grid.reach[0]), y = layers(g.grid.reach[1]), z = layers(g.grid.reach[2]);
     const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
@@ -124,32 +112,26 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
         wishes.clear();
         for (const auto& l : g.links(b)) {
             bool image = false;
-            for (int a = 0; a < 3; ++a)
-                image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
-            if (part[l.block] != part[b] || image)
-                wishes.push_back({part[l.block], image, l.d});
+            for (int a = 0; a < 3; ++a) image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
+            if (part[l.block] != part[b] || image) wishes.push_back({part[l.block], image, l.d});
         }
         std::ranges::stable_sort(wishes, {}, [](const Wish& w) { return std::pair(w.part, w.image); });
         for (std::size_t from = 0, to; from < wishes.size(); from = to) {
             to = from;
-            while (to < wishes.size() && wishes[to].part == wishes[from].part &&
-                   wishes[to].image == wishes[from].image)
-                ++to;
+            while (to < wishes.size() && wishes[to].part == wishes[from].part && wishes[to].image == wishes[from].image) ++to;
             double share = 0;
             for (const auto& lx : x)
                 for (const auto& ly : y)
                     for (const auto& lz : z)
                         for (std::size_t w = from; w < to; ++w) {
                             const auto& d = wishes[w].d;
-                            if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2]))
-                                continue;
+                            if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2])) continue;
                             share += lx.share * ly.share * lz.share;
                             break;
                         }
             const double rows = share * g.particles[b];
             r.ghosts[wishes[from].part] += rows;
-            if (wishes[from].part == part[b])
-                continue;
+            if (wishes[from].part == part[b]) continue;
             r.cut_bytes += rows * g.grid.row_bytes;
             sends[part[b]].push_back(wishes[from].part);
         }
@@ -178,23 +160,18 @@ std::uint64_t hilbert_index(std::array<std::uint32_t, 3> x, int bits)
             }
         }
     }
-    for (int i = 1; i < 3; ++i)
-        x[i] ^= x[i - 1];
+    for (int i = 1; i < 3; ++i) x[i] ^= x[i - 1];
     std::uint32_t t = 0;
     for (std::uint32_t q = top; q > 1; q >>= 1)
-        if (x[2] & q)
-            t ^= q - 1;
-    for (auto& c : x)
-        c ^= t;
+        if (x[2] & q) t ^= q - 1;
+    for (auto& c : x) c ^= t;
     std::uint64_t index = 0;
     for (int bit = bits - 1; bit >= 0; --bit)
-        for (int i = 0; i < 3; ++i)
-            index = index << 1 | (x[i] >> bit & 1);
+        for (int i = 0; i < 3; ++i) index = index << 1 | (x[i] >> bit & 1);
     return index;
 }
 
-namespace
-{
+namespace {
 
 using Cut = std::vector<int>;
 
@@ -203,17 +180,14 @@ Cut hilbert_cut(const BlockGraph& g, int parts)
 {
     Block low = g.block[0], high = g.block[0];
     for (const auto& b : g.block)
-        for (int a = 0; a < 3; ++a)
-            low[a] = std::min(low[a], b[a]), high[a] = std::max(high[a], b[a]);
+        for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], b[a]), high[a] = std::max(high[a], b[a]);
     int bits = 1;
     for (int a = 0; a < 3; ++a)
-        while ((high[a] - low[a]) >> bits)
-            ++bits;
+        while ((high[a] - low[a]) >> bits) ++bits;
     std::vector<std::pair<std::uint64_t, int>> curve;
     for (int b = 0; b < g.size(); ++b) {
         std::array<std::uint32_t, 3> x;
-        for (int a = 0; a < 3; ++a)
-            x[a] = std::uint32_t(g.block[b][a] - low[a]);
+        for (int a = 0; a < 3; ++a) x[a] = std::uint32_t(g.block[b][a] - low[a]);
         curve.emplace_back(hilbert_index(x, bits), b);
     }
     std::ranges::sort(curve);
@@ -244,17 +218,14 @@ struct MetisGraph {
         double all_work = std::accumulate(load.begin(), load.end(), 0.0), most = all_work;
         for (std::size_t k = 0; k < load.size() && int(k) < parts; ++k) {
             most = all_work / (parts - int(k));
-            if (load[k] <= most)
-                break;
+            if (load[k] <= most) break;
             all_work -= load[k];
         }
         load = g.work;
-        for (double& w : load)
-            w = std::min(w, most);
+        for (double& w : load) w = std::min(w, most);
         all_work = std::accumulate(load.begin(), load.end(), 0.0);
         double all_bytes = 0;
-        for (const auto& l : g.link)
-            all_bytes += l.bytes;
+        for (const auto& l : g.link) all_bytes += l.bytes;
         const double largest = 1 << 28;
         std::vector<std::pair<idx_t, double>> edges;
         for (int b = 0; b < g.size(); ++b) {
@@ -262,8 +233,7 @@ struct MetisGraph {
             work.push_back(all_work > 0 ? 1 + idx_t(load[b] / all_work * largest) : 1);
             edges.clear();
             for (const auto& l : g.links(b))
-                if (l.block != b)
-                    edges.emplace_back(l.block, l.bytes);
+                if (l.block != b) edges.emplace_back(l.block, l.bytes);
             std::ranges::sort(edges);
             for (std::size_t e = 0; e < edges.size(); ++e) {
                 const idx_t weight = 1 + idx_t(edges[e].second / std::max(all_bytes, 1.0) * largest);
@@ -282,8 +252,7 @@ struct MetisGraph {
         seen[0] = 1;
         for (std::size_t k = 0; k < queue.size(); ++k)
             for (idx_t e = first[queue[k]]; e < first[queue[k] + 1]; ++e)
-                if (!std::exchange(seen[neighbour[e]], 1))
-                    queue.push_back(neighbour[e]);
+                if (!std::exchange(seen[neighbour[e]], 1)) queue.push_back(neighbour[e]);
         connected = int(queue.size()) == g.size();
     }
 };
@@ -308,19 +277,16 @@ std::optional<Cut> metis_cut(MetisGraph& g, int parts, Way way)
     std::vector<idx_t> part(g.work.size());
     int rc = METIS_OK;
     if (way == Way::Bisection) {
-        rc = METIS_PartGraphRecursive(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(),
-                                      nullptr, g.bytes.data(), &k, nullptr, nullptr, options, &cut,
-                                      part.data());
+        rc = METIS_PartGraphRecursive(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(), nullptr, g.bytes.data(), &k,
+                                      nullptr, nullptr, options, &cut, part.data());
     } else {
         options[METIS_OPTION_CONTIG] = way == Way::ContiguousKway;
-        rc = METIS_PartGraphKway(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(), nullptr,
-                                 g.bytes.data(), &k, nullptr, nullptr, options, &cut, part.data());
+        rc = METIS_PartGraphKway(&n, &constraints, g.first.data(), g.neighbour.data(), g.work.data(), nullptr, g.bytes.data(), &k, nullptr,
+                                 nullptr, options, &cut, part.data());
     }
-    if (rc != METIS_OK)
-        return std::nullopt;
+    if (rc != METIS_OK) return std::nullopt;
     for (const idx_t p : part)
-        if (p < 0 || p >= parts)
-            return std::nullopt;
+        if (p < 0 || p >= parts) return std::nullopt;
     return Cut(part.begin(), part.end());
 }
 
@@ -331,11 +297,9 @@ struct Loads {
     std::vector<double> work;
     std::vector<int> blocks;
 
-    Loads(const BlockGraph& graph, Cut& cut, int parts)
-        : g(graph), part(cut), work(parts, 0.0), blocks(parts, 0)
+    Loads(const BlockGraph& graph, Cut& cut, int parts) : g(graph), part(cut), work(parts, 0.0), blocks(parts, 0)
     {
-        for (int b = 0; b < g.size(); ++b)
-            work[part[b]] += g.work[b], ++blocks[part[b]];
+        for (int b = 0; b < g.size(); ++b) work[part[b]] += g.work[b], ++blocks[part[b]];
     }
     void move(int b, int to)
     {
@@ -350,22 +314,17 @@ void fill_empty_parts(const BlockGraph& g, Cut& part, int parts)
 {
     Loads loads(g, part, parts);
     for (int p = 0; p < parts; ++p) {
-        if (loads.blocks[p] > 0)
-            continue;
+        if (loads.blocks[p] > 0) continue;
         int from = -1;
         for (int q = 0; q < parts; ++q)
-            if (loads.blocks[q] > 1 && (from < 0 || loads.work[q] > loads.work[from]))
-                from = q;
+            if (loads.blocks[q] > 1 && (from < 0 || loads.work[q] > loads.work[from])) from = q;
         int best = -1;
         double least = 0;
         for (int b = 0; b < g.size(); ++b) {
-            if (part[b] != from)
-                continue;
+            if (part[b] != from) continue;
             double ties = 0;
-            for (const auto& l : g.links(b))
-                ties += part[l.block] == from ? l.bytes : -l.bytes;
-            if (best < 0 || ties < least)
-                best = b, least = ties;
+            for (const auto& l : g.links(b)) ties += part[l.block] == from ? l.bytes : -l.bytes;
+            if (best < 0 || ties < least) best = b, least = ties;
         }
         loads.move(best, p);
     }
@@ -377,50 +336,38 @@ void even_out(const BlockGraph& g, Cut& part, int parts, double target)
 {
     Loads loads(g, part, parts);
     const double mean = std::accumulate(loads.work.begin(), loads.work.end(), 0.0) / parts;
-    if (!(mean > 0))
-        return;
+    if (!(mean > 0)) return;
     std::vector<std::vector<int>> members(parts);
     std::vector<int> order(parts);
     std::vector<double> ties(parts, 0.0);
     for (int pass = 0; pass < 40; ++pass) {
-        if (*std::ranges::max_element(loads.work) <= target * mean)
-            return;
-        for (auto& m : members)
-            m.clear();
-        for (int b = 0; b < g.size(); ++b)
-            members[part[b]].push_back(b);
+        if (*std::ranges::max_element(loads.work) <= target * mean) return;
+        for (auto& m : members) m.clear();
+        for (int b = 0; b < g.size(); ++b) members[part[b]].push_back(b);
         std::iota(order.begin(), order.end(), 0);
         std::ranges::stable_sort(order, [&](int a, int b) { return loads.work[a] > loads.work[b]; });
         bool moved = false;
         for (const int p : order) {
             // One block per part and pass: the loads around it change, so look again before the next.
-            if (loads.work[p] <= mean || loads.blocks[p] < 2)
-                continue;
+            if (loads.work[p] <= mean || loads.blocks[p] < 2) continue;
             int best = -1, to = -1;
             double most = 0;
             for (const int b : members[p]) {
-                if (part[b] != p || g.work[b] <= 0)
-                    continue;
-                for (const auto& l : g.links(b))
-                    ties[part[l.block]] += l.bytes;
+                if (part[b] != p || g.work[b] <= 0) continue;
+                for (const auto& l : g.links(b)) ties[part[l.block]] += l.bytes;
                 for (const auto& l : g.links(b)) {
                     const int q = part[l.block];
-                    if (q == p || !(loads.work[q] + g.work[b] < loads.work[p]))
-                        continue;
+                    if (q == p || !(loads.work[q] + g.work[b] < loads.work[p])) continue;
                     const double gain = ties[q] - ties[p];
-                    if (best < 0 || gain > most)
-                        best = b, to = q, most = gain;
+                    if (best < 0 || gain > most) best = b, to = q, most = gain;
                 }
-                for (const auto& l : g.links(b))
-                    ties[part[l.block]] = 0;
+                for (const auto& l : g.links(b)) ties[part[l.block]] = 0;
             }
-            if (best < 0)
-                continue;
+            if (best < 0) continue;
             loads.move(best, to);
             moved = true;
         }
-        if (!moved)
-            return;
+        if (!moved) return;
     }
 }
 
@@ -433,48 +380,38 @@ void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<in
     };
     std::vector<Share> shares;
     for (int b = 0; b < g.size(); ++b)
-        if (previous[b] >= 0 && previous[b] < parts)
-            shares.push_back({part[b], previous[b], g.work[b]});
+        if (previous[b] >= 0 && previous[b] < parts) shares.push_back({part[b], previous[b], g.work[b]});
     std::ranges::stable_sort(shares, {}, [](const Share& s) { return std::pair(s.now, s.before); });
     std::size_t kept = 0;
     for (const Share& s : shares) {
-        if (kept && shares[kept - 1].now == s.now && shares[kept - 1].before == s.before)
-            shares[kept - 1].work += s.work;
-        else
-            shares[kept++] = s;
+        if (kept && shares[kept - 1].now == s.now && shares[kept - 1].before == s.before) shares[kept - 1].work += s.work;
+        else shares[kept++] = s;
     }
     shares.resize(kept);
     std::ranges::stable_sort(shares, std::greater{}, &Share::work);
     std::vector<int> label(parts, -1);
     std::vector<char> taken(parts, 0);
     for (const Share& s : shares)
-        if (label[s.now] < 0 && !taken[s.before])
-            label[s.now] = s.before, taken[s.before] = 1;
+        if (label[s.now] < 0 && !taken[s.before]) label[s.now] = s.before, taken[s.before] = 1;
     int next = 0;
     for (int p = 0; p < parts; ++p) {
-        if (label[p] >= 0)
-            continue;
-        while (taken[next])
-            ++next;
+        if (label[p] >= 0) continue;
+        while (taken[next]) ++next;
         label[p] = next, taken[next] = 1;
     }
-    for (int& p : part)
-        p = label[p];
+    for (int& p : part) p = label[p];
 }
 
 Cut best_cut(const BlockGraph& g, int parts, Method method)
 {
-    if (parts == 1)
-        return Cut(g.size(), 0);
+    if (parts == 1) return Cut(g.size(), 0);
     Cut one_each(g.size());
     std::iota(one_each.begin(), one_each.end(), 0);
-    if (parts == g.size())
-        return one_each;
+    if (parts == g.size()) return one_each;
 
     Cut best = hilbert_cut(g, parts);
     fill_empty_parts(g, best, parts);
-    if (method == Method::Hilbert)
-        return best;
+    if (method == Method::Hilbert) return best;
 
     constexpr double good = 1.03; // imbalance below which only the halo counts
     even_out(g, best, parts, good);
@@ -482,25 +419,19 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
     MetisGraph metis(g, parts);
     const auto consider = [&](Way way) {
         auto cut = metis_cut(metis, parts, way);
-        if (!cut)
-            return;
+        if (!cut) return;
         fill_empty_parts(g, *cut, parts);
         even_out(g, *cut, parts, good);
         const CutReport r = describe(g, *cut, parts);
-        if (std::pair(std::max(good, r.imbalance), r.cut_bytes) >=
-            std::pair(std::max(good, report.imbalance), report.cut_bytes))
-            return;
+        if (std::pair(std::max(good, r.imbalance), r.cut_bytes) >= std::pair(std::max(good, report.imbalance), report.cut_bytes)) return;
         best = std::move(*cut);
         report = r;
     };
     // Bisection cuts best in most scenes, and fastest; it complains on standard output where it runs out of
     // blocks.
-    if (g.size() >= 3 * parts)
-        consider(Way::Bisection);
-    if (g.size() > small_graph)
-        return best;
-    if (metis.connected)
-        consider(Way::ContiguousKway);
+    if (g.size() >= 3 * parts) consider(Way::Bisection);
+    if (g.size() > small_graph) return best;
+    if (metis.connected) consider(Way::ContiguousKway);
     consider(Way::Kway);
     return best;
 }
@@ -511,11 +442,9 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
 {
     ensure(parts >= 1, "a cut has at least one part");
     ensure(!previous || int(previous->size()) == g.size(), "the previous cut has another number of blocks");
-    if (g.size() == 0)
-        return {};
+    if (g.size() == 0) return {};
     Cut part = best_cut(g, std::min(parts, g.size()), method);
-    if (previous)
-        keep_labels(g, part, parts, *previous);
+    if (previous) keep_labels(g, part, parts, *previous);
     return part;
 }
 

@@ -9,8 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// Place of a block in the grid of blocks, by axis.
 using Block = std::array<std::int32_t, 3>;
@@ -22,15 +21,13 @@ inline constexpr std::int32_t block_limit = 1 << 20;
 inline std::uint64_t key_of(const Block& b)
 {
     std::uint64_t k = 0;
-    for (const auto c : b)
-        k = k << 21 | std::uint64_t(c + block_limit);
+    for (const auto c : b) k = k << 21 | std::uint64_t(c + block_limit);
     return k;
 }
 
 /// From blocks to their place in a list.
-class BlockIndex
-{
-  public:
+class BlockIndex {
+public:
     void reserve(std::size_t n) { at_.reserve(n); }
     void set(const Block& b, int value) { at_[key_of(b)] = value; }
     /// The value set for this block, or -1.
@@ -40,7 +37,7 @@ class BlockIndex
         return found == at_.end() ? -1 : found->second;
     }
 
-  private:
+private:
     std::unordered_map<std::uint64_t, int> at_;
 };
 
@@ -102,8 +99,7 @@ CutReport describe(const BlockGraph&, std::span<const int> part, int parts);
 /// blocks. `previous` (part of each block before, or -1) only permutes the labels, so that most work stays
 /// where it was. Metis: the best of several cuts by METIS 5, evened out; where none is better, the Hilbert
 /// curve's.
-std::vector<int> partition(const BlockGraph&, int parts, Method = Method::Metis,
-                           const std::vector<int>* previous = nullptr);
+std::vector<int> partition(const BlockGraph&, int parts, Method = Method::Metis, const std::vector<int>* previous = nullptr);
 
 /// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004)
 /// 381.

@@ -3,8 +3,7 @@
 // result.
 #include "solver/core/team.hpp"
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// Largest over mean of a figure of each rank (seconds, pair work); 1 where all are zero. Collective.
 double imbalance(const Team&, double mine);
@@ -15,9 +14,8 @@ double imbalance(const Team&, double mine);
 /// answers an idle time that stays the same, where W falls for ever. Idle time that a fresh cut did not
 /// remove does not count, so the rule falls silent where cutting does not help; what does count is summed
 /// with its sign (never below zero), so that noise cancels.
-class Rebalance
-{
-  public:
+class Rebalance {
+public:
     /// `promised`: the imbalance that the first cut expects (CutReport::imbalance); `cut_seconds`: what it
     /// cost.
     explicit Rebalance(double promised = 1, double cut_seconds = 0);
@@ -35,12 +33,12 @@ class Rebalance
     double idle_seconds() const { return idle_; }
     double cut_seconds() const { return cost_; }
 
-  private:
+private:
     static constexpr double noticeable = 0.02; // idle share that nobody should act upon
-    static constexpr int settling = 5; // calls after a new cut that show what it achieved; the first is cold
-    double floor_;                     // idle share that the present cut started from
-    double cost_;                      // s
-    double idle_ = 0;                  // s
+    static constexpr int settling = 5;         // calls after a new cut that show what it achieved; the first is cold
+    double floor_;                             // idle share that the present cut started from
+    double cost_;                              // s
+    double idle_ = 0;                          // s
     double imbalance_ = 1, smooth_ = 1;
     int calls_ = 0;         // since the last cut
     bool measured_ = false; // the present cut was made by cut(): its first calls set floor_

@@ -5,10 +5,8 @@
 #include <fmt/format.h>
 #include <png.h>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 // ---- the letters
 // ----------------------------------------------------------------------------------------------------- Drawn
@@ -128,19 +126,16 @@ Stroke smooth(Stroke s, bool closed)
     for (int round = 0; round < 3; ++round) {
         Stroke finer;
         const std::size_t n = s.size();
-        if (!closed)
-            finer.push_back(s.front());
+        if (!closed) finer.push_back(s.front());
         for (std::size_t i = 0; i + (closed ? 0 : 1) < n; ++i) {
             const Point a = s[i], b = s[(i + 1) % n];
             finer.push_back({0.75 * a.x + 0.25 * b.x, 0.75 * a.y + 0.25 * b.y});
             finer.push_back({0.25 * a.x + 0.75 * b.x, 0.25 * a.y + 0.75 * b.y});
         }
-        if (!closed)
-            finer.push_back(s.back());
+        if (!closed) finer.push_back(s.back());
         s = std::move(finer);
     }
-    if (closed)
-        s.push_back(s.front());
+    if (closed) s.push_back(s.front());
     return s;
 }
 
@@ -150,13 +145,10 @@ std::vector<Stroke> strokes_of(std::string_view glyph)
     for (std::size_t i = 0; i < glyph.size();) {
         const auto end = std::min(glyph.find(' ', i), glyph.size());
         const char kind = glyph[i];
-        if (kind == '~' || kind == '@')
-            ++i;
+        if (kind == '~' || kind == '@') ++i;
         Stroke s;
-        for (; i + 1 < end; i += 2)
-            s.push_back({double(digit(glyph[i])), double(digit(glyph[i + 1]) - 3)});
-        if (kind == '~' || kind == '@')
-            s = smooth(s, kind == '@');
+        for (; i + 1 < end; i += 2) s.push_back({double(digit(glyph[i])), double(digit(glyph[i + 1]) - 3)});
+        if (kind == '~' || kind == '@') s = smooth(s, kind == '@');
         all.push_back(std::move(s));
         i = end + 1;
     }
@@ -167,8 +159,7 @@ double advance(const char* glyph)
 {
     double width = -1;
     for (const auto& s : strokes_of(glyph))
-        for (const Point p : s)
-            width = std::max(width, p.x);
+        for (const Point p : s) width = std::max(width, p.x);
     return (width < 0 ? space_width : width) + gap;
 }
 
@@ -176,8 +167,7 @@ template <class F> void for_each_glyph(std::string_view text, F f)
 {
     for (const char c : text) {
         const auto u = static_cast<unsigned char>(c);
-        if ((u & 0xc0) == 0x80)
-            continue; // the rest of a letter in several bytes
+        if ((u & 0xc0) == 0x80) continue; // the rest of a letter in several bytes
         f(u >= 32 && u < 127 ? glyphs[u - 32] : unknown_glyph);
     }
 }
@@ -191,20 +181,16 @@ Canvas::Canvas(int width, int height, Rgb background)
 
 void Canvas::blend(int x, int y, double cover, Rgb c)
 {
-    if (x < 0 || y < 0 || x >= width_ || y >= height_)
-        return;
+    if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
     Rgb& p = at(x, y);
-    const auto mixed = [&](std::uint8_t a, std::uint8_t b) {
-        return std::uint8_t(std::lround(a + (b - a) * cover));
-    };
+    const auto mixed = [&](std::uint8_t a, std::uint8_t b) { return std::uint8_t(std::lround(a + (b - a) * cover)); };
     p = {mixed(p.r, c.r), mixed(p.g, c.g), mixed(p.b, c.b)};
 }
 
 void Canvas::rectangle(int x, int y, int width, int height, Rgb c)
 {
     for (int b = y; b < y + height; ++b)
-        for (int a = x; a < x + width; ++a)
-            blend(a, b, 1, c);
+        for (int a = x; a < x + width; ++a) blend(a, b, 1, c);
 }
 
 void Canvas::line(double x0, double y0, double x1, double y1, double thickness, Rgb c)
@@ -215,8 +201,7 @@ void Canvas::line(double x0, double y0, double x1, double y1, double thickness, 
             const double px = x + 0.5 - x0, py = y + 0.5 - y0;
             const double s = l2 > 0 ? std::clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0;
             const double cover = 0.5 * thickness + 0.5 - std::hypot(px - s * dx, py - s * dy);
-            if (cover > 0)
-                blend(x, y, std::min(cover, 1.0), c);
+            if (cover > 0) blend(x, y, std::min(cover, 1.0), c);
         }
 }
 
@@ -230,16 +215,15 @@ double Canvas::text_width(double size, std::string_view text)
 void Canvas::text(double x, double y, double size, std::string_view text, Rgb color, Anchor anchor)
 {
     const double unit = size / capital, pen = std::max(0.13 * size, 1.2);
-    if (anchor != Anchor::Left)
-        x -= text_width(size, text) * (anchor == Anchor::Middle ? 0.5 : 1.0);
+    if (anchor != Anchor::Left) x -= text_width(size, text) * (anchor == Anchor::Middle ? 0.5 : 1.0);
     for (const bool rim : {true, false}) {
         double at = x;
         for_each_glyph(text, [&](const char* g) {
             for (const auto& s : strokes_of(g))
                 for (std::size_t i = 0; i == 0 || i + 1 < s.size(); ++i) {
                     const Point a = s[i], b = s[std::min(i + 1, s.size() - 1)];
-                    line(at + unit * a.x, y - unit * a.y, at + unit * b.x, y - unit * b.y,
-                         rim ? pen + 3 : pen, rim ? Rgb{255, 255, 255} : color);
+                    line(at + unit * a.x, y - unit * a.y, at + unit * b.x, y - unit * b.y, rim ? pen + 3 : pen,
+                         rim ? Rgb{255, 255, 255} : color);
                 }
             at += unit * advance(g);
         });

@@ -4,8 +4,7 @@
 #include <array>
 #include <vector>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 struct Rgb {
     std::uint8_t r, g, b;
@@ -14,9 +13,8 @@ struct Rgb {
 /// Where a text is held.
 enum class Anchor { Left, Middle, Right };
 
-class Canvas
-{
-  public:
+class Canvas {
+public:
     Canvas(int width, int height, Rgb background = {255, 255, 255});
     int width() const { return width_; }
     int height() const { return height_; }
@@ -34,7 +32,7 @@ class Canvas
     /// The canvas as a PNG file's bytes. Throws IoFailed.
     std::string png() const;
 
-  private:
+private:
     void blend(int x, int y, double cover, Rgb);
     int width_, height_;
     std::vector<Rgb> pixels_;

@@ -6,10 +6,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 using nlohmann::json;
 
@@ -30,10 +28,8 @@ std::uint64_t mix(std::uint64_t h)
 }
 template <class T> std::uint64_t word(T v)
 {
-    if constexpr (sizeof(T) == 8)
-        return std::bit_cast<std::uint64_t>(v);
-    else
-        return std::uint64_t(std::make_unsigned_t<T>(v));
+    if constexpr (sizeof(T) == 8) return std::bit_cast<std::uint64_t>(v);
+    else return std::uint64_t(std::make_unsigned_t<T>(v));
 }
 template <class T> std::uint64_t sum_of_rows(std::span<const T> rows, int components, std::uint64_t first)
 {
@@ -41,8 +37,7 @@ template <class T> std::uint64_t sum_of_rows(std::span<const T> rows, int compon
     const auto n = rows.size() / std::size_t(components);
     for (std::size_t i = 0; i < n; ++i) {
         std::uint64_t h = (first + i + 1) * 0x9e3779b97f4a7c15u;
-        for (int c = 0; c < components; ++c)
-            h = mix(h ^ word(rows[i * std::size_t(components) + std::size_t(c)]));
+        for (int c = 0; c < components; ++c) h = mix(h ^ word(rows[i * std::size_t(components) + std::size_t(c)]));
         sum += h;
     }
     return sum;
@@ -56,8 +51,7 @@ std::uint64_t sum_over_ranks(const Team& team, std::uint64_t mine)
 }
 std::uint64_t sum_of_text(std::string_view text)
 {
-    const std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(text.data()),
-                                              text.size());
+    const std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
     return mix(sum_of_rows(bytes, 1, 0) ^ text.size());
 }
 std::string hex(std::uint64_t v) { return fmt::format("{:016x}", v); }
@@ -84,8 +78,7 @@ struct Manifest {
 std::string read_bytes(const H5Reader& in, const std::string& name)
 {
     const auto t = in.table(name);
-    if (t.rows > longest_text)
-        in.refuse(fmt::format("table {} is too long for a text ({} bytes)", name, t.rows));
+    if (t.rows > longest_text) in.refuse(fmt::format("table {} is too long for a text ({} bytes)", name, t.rows));
     std::vector<std::uint8_t> bytes;
     in.rows(name, 0, t.rows, 1, bytes);
     return {bytes.begin(), bytes.end()};
@@ -93,34 +86,27 @@ std::string read_bytes(const H5Reader& in, const std::string& name)
 
 Manifest read_manifest(const H5Reader& in)
 {
-    if (!in.has("/manifest"))
-        in.refuse("not a checkpoint of kuzure (it has no /manifest)");
+    if (!in.has("/manifest")) in.refuse("not a checkpoint of kuzure (it has no /manifest)");
     const std::string text = read_bytes(in, "/manifest");
-    if (in.text("/manifest", "checksum") != hex(sum_of_text(text)))
-        in.refuse("damaged: the checksum of /manifest does not fit");
+    if (in.text("/manifest", "checksum") != hex(sum_of_text(text))) in.refuse("damaged: the checksum of /manifest does not fit");
     Manifest m;
     try {
         const json all = json::parse(text);
-        if (all.at("format") != format_name)
-            in.refuse("not a checkpoint of kuzure");
+        if (all.at("format") != format_name) in.refuse("not a checkpoint of kuzure");
         if (all.at("version") != format_version)
-            in.refuse(fmt::format(
-                "checkpoint format {}, this program reads format {}: use the version that wrote it",
-                all.at("version").dump(), format_version));
+            in.refuse(fmt::format("checkpoint format {}, this program reads format {}: use the version that wrote it",
+                                  all.at("version").dump(), format_version));
         m.what.file = in.file();
         m.what.particles = all.at("particles").get<std::int64_t>();
         m.what.scene_hash = all.at("scene_hash").get<std::string>();
         for (const auto& f : all.at("fields"))
-            m.fields.push_back({f.at("name").get<std::string>(), f.at("components").get<int>(),
-                                f.at("checksum").get<std::string>()});
+            m.fields.push_back({f.at("name").get<std::string>(), f.at("components").get<int>(), f.at("checksum").get<std::string>()});
         m.what.header = read_bytes(in, "/header");
-        if (all.at("header_checksum") != hex(sum_of_text(m.what.header)))
-            in.refuse("damaged: the checksum of /header does not fit");
+        if (all.at("header_checksum") != hex(sum_of_text(m.what.header))) in.refuse("damaged: the checksum of /header does not fit");
     } catch (const json::exception& e) {
         in.refuse(fmt::format("damaged: /manifest does not say what it should ({})", e.what()));
     }
-    if (m.what.particles < 0)
-        in.refuse("damaged: a negative number of particles");
+    if (m.what.particles < 0) in.refuse("damaged: a negative number of particles");
     return m;
 }
 
@@ -135,8 +121,7 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
         } catch (const IoFailed& e) {
             complaint = e.what();
         } catch (const std::bad_alloc&) {
-            complaint =
-                fmt::format("{}: not enough memory to read it: use more ranks on more nodes", file.string());
+            complaint = fmt::format("{}: not enough memory to read it: use more ranks on more nodes", file.string());
         }
         agree(team, complaint);
     };
@@ -146,8 +131,7 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
     std::uint64_t first = 0, count = 0;
     guarded([&] {
         m = read_manifest(in.emplace(file));
-        const auto total = std::uint64_t(m.what.particles), ranks = std::uint64_t(team.size()),
-                   me = std::uint64_t(team.rank());
+        const auto total = std::uint64_t(m.what.particles), ranks = std::uint64_t(team.size()), me = std::uint64_t(team.rank());
         first = total / ranks * me + std::min(me, total % ranks);
         count = total / ranks + (me < total % ranks ? 1 : 0);
         if (count > std::uint64_t(std::numeric_limits<Index>::max()) - 2 * Particles::padding)
@@ -155,34 +139,28 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
         // Before memory is taken: every table has the rows and columns that the manifest names.
         for (const auto& f : m.fields)
             if (const auto t = in->table(table_name(f.name)); t.rows != total || t.components != f.components)
-                in->refuse(fmt::format("damaged: table {} is {} x {}, expected {} x {}", table_name(f.name),
-                                       t.rows, t.components, total, f.components));
+                in->refuse(fmt::format("damaged: table {} is {} x {}, expected {} x {}", table_name(f.name), t.rows, t.components, total,
+                                       f.components));
         std::size_t known = 0;
         std::apply(
             [&](auto... f) {
                 (std::for_each(m.fields.begin(), m.fields.end(),
                                [&](const FieldEntry& e) {
-                                   if (e.name != f.name)
-                                       return;
+                                   if (e.name != f.name) return;
                                    if (e.components != f.components)
-                                       in->refuse(fmt::format("field {} has {} components, expected {}",
-                                                              f.name, e.components, f.components));
+                                       in->refuse(
+                                           fmt::format("field {} has {} components, expected {}", f.name, e.components, f.components));
                                    ++known;
-                                   if (into)
-                                       into->require(f);
+                                   if (into) into->require(f);
                                }),
                  ...);
             },
             AllFields{});
-        if (known != m.fields.size())
-            in->refuse("holds fields this version of kuzure does not know: use the version that wrote it");
+        if (known != m.fields.size()) in->refuse("holds fields this version of kuzure does not know: use the version that wrote it");
         if (into) {
             into->for_each_present([&](auto f) {
-                if (std::none_of(m.fields.begin(), m.fields.end(),
-                                 [&](const FieldEntry& e) { return e.name == f.name; }))
-                    in->refuse(fmt::format(
-                        "lacks the field '{}', which this run needs: the scene's effects have changed",
-                        f.name));
+                if (std::none_of(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; }))
+                    in->refuse(fmt::format("lacks the field '{}', which this run needs: the scene's effects have changed", f.name));
             });
             into->resize(0);
             into->resize(Index(count));
@@ -191,10 +169,8 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
 
     const auto read_field = [&](auto f) {
         using T = typename decltype(f)::Number;
-        const auto entry = std::find_if(m.fields.begin(), m.fields.end(),
-                                        [&](const FieldEntry& e) { return e.name == f.name; });
-        if (entry == m.fields.end())
-            return;
+        const auto entry = std::find_if(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; });
+        if (entry == m.fields.end()) return;
         std::uint64_t sum = 0;
         guarded([&] {
             std::vector<T> rows;
@@ -202,25 +178,21 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
                 const auto n = std::min(rows_at_a_time, count - at);
                 in->rows(table_name(f.name), first + at, n, f.components, rows);
                 sum += sum_of_rows(std::span<const T>(rows), f.components, first + at);
-                if (!into)
-                    continue;
+                if (!into) continue;
                 const auto view = (*into)[f];
                 for (std::uint64_t i = 0; i < n; ++i)
-                    for (int c = 0; c < f.components; ++c)
-                        view.column[c][at + i] = rows[i * f.components + c];
+                    for (int c = 0; c < f.components; ++c) view.column[c][at + i] = rows[i * f.components + c];
             }
         });
         sum = sum_over_ranks(team, sum);
         guarded([&] {
-            if (hex(sum) != entry->checksum)
-                in->refuse(fmt::format("damaged: the checksum of {} does not fit", table_name(f.name)));
+            if (hex(sum) != entry->checksum) in->refuse(fmt::format("damaged: the checksum of {} does not fit", table_name(f.name)));
         });
     };
     try {
         std::apply([&](auto... f) { (read_field(f), ...); }, AllFields{});
     } catch (...) {
-        if (into)
-            into->resize(0);
+        if (into) into->resize(0);
         throw;
     }
     return m.what;
@@ -233,8 +205,7 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
     return std::uint64_t(particles) * bytes_per_particle + (1 << 17); // the rows, and some for the library
 }
 
-Path write_checkpoint(const Team& team, const Path& directory, const Particles& p,
-                      const std::string& scene_hash, const std::string& header)
+Path write_checkpoint(const Team& team, const Path& directory, const Particles& p, const std::string& scene_hash, const std::string& header)
 {
     const Path file = directory / "checkpoint.h5", previous = directory / "checkpoint.prev.h5";
     try {
@@ -242,23 +213,20 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
         const auto first = std::uint64_t(team.sum_below(std::int64_t(p.size())));
         H5Writer out(team, file, checkpoint_bytes(total, p.bytes_per_particle()));
         out.group("/particles");
-        json manifest = {{"format", format_name},   {"version", format_version},
-                         {"particles", total},      {"scene_hash", scene_hash},
-                         {"fields", json::array()}, {"header_checksum", hex(sum_of_text(header))}};
+        json manifest = {{"format", format_name},    {"version", format_version}, {"particles", total},
+                         {"scene_hash", scene_hash}, {"fields", json::array()},   {"header_checksum", hex(sum_of_text(header))}};
         p.for_each_present([&](auto f) {
             using T = typename decltype(f)::Number;
             const auto view = p[f];
             const auto n = std::size_t(p.size());
             std::vector<T> rows(n * f.components);
             for (std::size_t i = 0; i < n; ++i)
-                for (int c = 0; c < f.components; ++c)
-                    rows[i * f.components + std::size_t(c)] = view.column[c][i];
+                for (int c = 0; c < f.components; ++c) rows[i * f.components + std::size_t(c)] = view.column[c][i];
             const std::span<const T> mine(rows);
             out.table(table_name(f.name), mine, f.components);
             out.attribute(table_name(f.name), "unit", f.unit);
             const auto sum = sum_over_ranks(team, sum_of_rows(mine, f.components, first));
-            manifest["fields"].push_back(
-                {{"name", f.name}, {"components", f.components}, {"checksum", hex(sum)}});
+            manifest["fields"].push_back({{"name", f.name}, {"components", f.components}, {"checksum", hex(sum)}});
         });
         out.table("/header", bytes_on_root(team, header), 1);
         const std::string text = manifest.dump(1);
@@ -266,8 +234,7 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
         out.attribute("/manifest", "checksum", hex(sum_of_text(text)));
         out.finish();
         on_root(team, [&] {
-            if (std::filesystem::exists(file))
-                move_file(file, previous);
+            if (std::filesystem::exists(file)) move_file(file, previous);
             move_file(out.temporary(), file);
             sync(directory);
         });
@@ -275,8 +242,7 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
         std::string good;
         if (team.rank() == 0)
             for (const auto& candidate : {previous, file})
-                if (std::filesystem::exists(candidate))
-                    good = candidate.string();
+                if (std::filesystem::exists(candidate)) good = candidate.string();
         good = team.broadcast(good);
         throw IoFailed(good.empty() ? fmt::format("{}. No checkpoint was written before this one", e.what())
                                     : fmt::format("{}. The last good checkpoint is {}", e.what(), good));
@@ -284,39 +250,30 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
     return file;
 }
 
-Checkpoint read_checkpoint(const Team& team, const Path& file, Particles& into)
-{
-    return read_all(team, file, &into);
-}
+Checkpoint read_checkpoint(const Team& team, const Path& file, Particles& into) { return read_all(team, file, &into); }
 
 Checkpoint verify_checkpoint(const Team& team, const Path& file) { return read_all(team, file, nullptr); }
 
-std::optional<Checkpoint> newest_good(const Team& team, const Path& directory,
-                                      const std::function<void(const std::string&)>& say)
+std::optional<Checkpoint> newest_good(const Team& team, const Path& directory, const std::function<void(const std::string&)>& say)
 {
     std::vector<std::string> passed_over;
     // The unrenamed file is newer than the previous generation where the crash fell between the two renames.
     for (const char* name : {"checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.prev.h5"}) {
         const Path file = directory / name;
-        if (!team.any(team.rank() == 0 && std::filesystem::exists(file)))
-            continue;
+        if (!team.any(team.rank() == 0 && std::filesystem::exists(file))) continue;
         const bool half_written = file.extension() == ".tmp";
         try {
             Checkpoint good = verify_checkpoint(team, file);
             for (const auto& why : passed_over)
-                if (team.rank() == 0)
-                    say(fmt::format("{}. Going back to {}", why, file.string()));
+                if (team.rank() == 0) say(fmt::format("{}. Going back to {}", why, file.string()));
             return good;
         } catch (const IoFailed& e) {
-            if (!half_written)
-                passed_over.emplace_back(e.what());
+            if (!half_written) passed_over.emplace_back(e.what());
         }
     }
-    if (passed_over.empty())
-        return {};
+    if (passed_over.empty()) return {};
     std::string all;
-    for (const auto& why : passed_over)
-        all += why + ". ";
+    for (const auto& why : passed_over) all += why + ". ";
     throw IoFailed(all + "No good checkpoint is left: run from the start with --force");
 }
 

@@ -6,8 +6,7 @@
 #include "solver/core/particles.hpp"
 #include <optional>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 struct Checkpoint {
     Path file;
@@ -22,8 +21,7 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
 /// Collective. Writes every present field to directory/checkpoint.h5; the checkpoint before it becomes
 /// checkpoint.prev.h5. Until the new one is whole and on the disk, the old ones stay as they are. Throws
 /// IoFailed, naming the checkpoint that is still good. Gives the file's path.
-Path write_checkpoint(const Team&, const Path& directory, const Particles&, const std::string& scene_hash,
-                      const std::string& header);
+Path write_checkpoint(const Team&, const Path& directory, const Particles&, const std::string& scene_hash, const std::string& header);
 
 /// Collective. Replaces the particles: each rank gets a contiguous share of the rows as written, with the
 /// fields of the file. Refuses by IoFailed, on all ranks, what is damaged, cut short, of another format, or
@@ -36,7 +34,6 @@ Checkpoint verify_checkpoint(const Team&, const Path& file);
 /// Collective. The newest checkpoint of the directory that passes verify_checkpoint, or nothing if there is
 /// none at all. `say` gets, on rank 0, a sentence for each one passed over. Throws IoFailed if there are some
 /// and all are damaged.
-std::optional<Checkpoint> newest_good(const Team&, const Path& directory,
-                                      const std::function<void(const std::string&)>& say);
+std::optional<Checkpoint> newest_good(const Team&, const Path& directory, const std::function<void(const std::string&)>& say);
 
 } // namespace kuzure::io

@@ -7,10 +7,8 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 /// An open file that closes itself.
 struct Descriptor {
@@ -19,8 +17,7 @@ struct Descriptor {
     Descriptor(const Descriptor&) = delete;
     ~Descriptor()
     {
-        if (fd >= 0)
-            ::close(fd);
+        if (fd >= 0) ::close(fd);
     }
 };
 
@@ -36,8 +33,7 @@ void agree(const Team& team, const std::string& complaint)
     const auto none = std::int64_t(team.size());
     std::int64_t first = complaint.empty() ? none : team.rank();
     team.min(std::span(&first, 1));
-    if (first == none)
-        return;
+    if (first == none) return;
     throw IoFailed(team.broadcast(complaint, int(first)));
 }
 
@@ -54,10 +50,8 @@ void on_root(const Team& team, const std::function<void()>& work)
         }
     }
     outcome = team.broadcast(outcome);
-    if (outcome.empty())
-        return;
-    if (outcome[0] == 'B')
-        throw BadInput(outcome.substr(1));
+    if (outcome.empty()) return;
+    if (outcome[0] == 'B') throw BadInput(outcome.substr(1));
     throw IoFailed(outcome.substr(1));
 }
 
@@ -65,11 +59,9 @@ std::uint64_t free_bytes(const Path& path)
 {
     std::error_code ignored;
     Path there = std::filesystem::absolute(path, ignored);
-    while (!std::filesystem::exists(there, ignored) && there.has_relative_path())
-        there = there.parent_path();
+    while (!std::filesystem::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
     struct statvfs disk;
-    if (::statvfs(there.c_str(), &disk) != 0)
-        fail(there, "asking for the free space", errno);
+    if (::statvfs(there.c_str(), &disk) != 0) fail(there, "asking for the free space", errno);
     return std::uint64_t(disk.f_bavail) * disk.f_frsize;
 }
 
@@ -84,12 +76,10 @@ std::string cause(const Path& path, int error)
     }
     const std::uint64_t little = 1 << 20;
     if (error == ENOSPC || error == EDQUOT || left < little)
-        words +=
-            fmt::format(". The disk is full ({:.1f} MB free): make room or choose another directory with -o, "
-                        "then go on with --restart",
-                        double(left) / 1e6);
-    else if (error == EACCES || error == EPERM || error == EROFS)
-        words += ". Choose a directory you may write to with -o";
+        words += fmt::format(". The disk is full ({:.1f} MB free): make room or choose another directory with -o, "
+                             "then go on with --restart",
+                             double(left) / 1e6);
+    else if (error == EACCES || error == EPERM || error == EROFS) words += ". Choose a directory you may write to with -o";
     return words;
 }
 
@@ -99,20 +89,17 @@ void write_atomically(const Path& path, std::string_view content)
     int error = 0;
     {
         const Descriptor out(::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-        if (out.fd < 0)
-            fail(path, "creating the file", errno);
+        if (out.fd < 0) fail(path, "creating the file", errno);
         while (!content.empty()) {
             const auto n = ::write(out.fd, content.data(), content.size());
-            if (n < 0 && errno == EINTR)
-                continue;
+            if (n < 0 && errno == EINTR) continue;
             if (n <= 0) {
                 error = n < 0 ? errno : ENOSPC;
                 break;
             }
             content.remove_prefix(std::size_t(n));
         }
-        if (!error && ::fsync(out.fd) != 0)
-            error = errno;
+        if (!error && ::fsync(out.fd) != 0) error = errno;
     }
     if (error) {
         ::unlink(beside.c_str());
@@ -125,26 +112,19 @@ void write_atomically(const Path& path, std::string_view content)
 std::string read_text(const Path& path, std::uint64_t limit)
 {
     const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (in.fd < 0)
-        fail(path, "opening", errno);
+    if (in.fd < 0) fail(path, "opening", errno);
     struct stat info;
-    if (::fstat(in.fd, &info) != 0)
-        fail(path, "reading", errno);
-    if (!S_ISREG(info.st_mode))
-        throw IoFailed(fmt::format("{}: expected a file, found something else", path.string()));
+    if (::fstat(in.fd, &info) != 0) fail(path, "reading", errno);
+    if (!S_ISREG(info.st_mode)) throw IoFailed(fmt::format("{}: expected a file, found something else", path.string()));
     if (std::uint64_t(info.st_size) > limit)
-        throw IoFailed(fmt::format("{}: {} bytes, more than a file of this kind can have ({})", path.string(),
-                                   info.st_size, limit));
+        throw IoFailed(fmt::format("{}: {} bytes, more than a file of this kind can have ({})", path.string(), info.st_size, limit));
     std::string text(std::size_t(info.st_size), '\0');
     std::size_t have = 0;
     while (have < text.size()) {
         const auto n = ::read(in.fd, text.data() + have, text.size() - have);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n < 0)
-            fail(path, "reading", errno);
-        if (n == 0)
-            break;
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) fail(path, "reading", errno);
+        if (n == 0) break;
         have += std::size_t(n);
     }
     text.resize(have);
@@ -154,17 +134,14 @@ std::string read_text(const Path& path, std::uint64_t limit)
 void sync(const Path& path)
 {
     const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-    if (file.fd < 0)
-        fail(path, "opening", errno);
+    if (file.fd < 0) fail(path, "opening", errno);
     // EINVAL: this file system does not sync directories; it then needs none.
-    if (::fsync(file.fd) != 0 && errno != EINVAL)
-        fail(path, "bringing it to the disk", errno);
+    if (::fsync(file.fd) != 0 && errno != EINVAL) fail(path, "bringing it to the disk", errno);
 }
 
 void move_file(const Path& from, const Path& to)
 {
-    if (::rename(from.c_str(), to.c_str()) != 0)
-        fail(to, fmt::format("renaming {} to it", from.string()).c_str(), errno);
+    if (::rename(from.c_str(), to.c_str()) != 0) fail(to, fmt::format("renaming {} to it", from.string()).c_str(), errno);
 }
 
 Path directory_of(const Path& path)

@@ -8,8 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 using Path = std::filesystem::path;
 

@@ -6,29 +6,25 @@
 #include <hdf5.h>
 #include <unistd.h>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 static_assert(sizeof(hid_t) == sizeof(std::int64_t));
 
 /// An HDF5 identifier that gives itself back.
-class Handle
-{
-  public:
+class Handle {
+public:
     Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
     Handle(const Handle&) = delete;
     Handle& operator=(const Handle&) = delete;
     ~Handle()
     {
-        if (id_ >= 0)
-            close_(id_);
+        if (id_ >= 0) close_(id_);
     }
     operator hid_t() const { return id_; }
     bool ok() const { return id_ >= 0; }
 
-  private:
+private:
     hid_t id_;
     herr_t (*close_)(hid_t);
 };
@@ -60,14 +56,12 @@ Complaint last_complaint()
     H5Ewalk2(
         H5E_DEFAULT, H5E_WALK_UPWARD,
         [](unsigned depth, const H5E_error2_t* e, void* out) -> herr_t {
-            if (depth == 0 && e->desc)
-                static_cast<Complaint*>(out)->words = e->desc;
+            if (depth == 0 && e->desc) static_cast<Complaint*>(out)->words = e->desc;
             return 0;
         },
         &c);
     const std::string key = "errno = ";
-    if (const auto at = c.words.find(key); at != std::string::npos)
-        c.error = std::atoi(c.words.c_str() + at + key.size());
+    if (const auto at = c.words.find(key); at != std::string::npos) c.error = std::atoi(c.words.c_str() + at + key.size());
     return c;
 }
 
@@ -102,35 +96,29 @@ std::size_t bytes_of(Number n)
 // ---- writing -------------------------------------------------------------------------------------------
 void H5Writer::check(bool ok, const std::string& doing)
 {
-    if (ok || !complaint_.empty())
-        return;
+    if (ok || !complaint_.empty()) return;
     const Complaint c = last_complaint();
     complaint_ = fmt::format("{}: {} failed: {}{}", file_.string(), doing, cause(file_, c.error),
                              c.words.empty() ? "" : fmt::format(" (HDF5: {})", c.words));
 }
 
-H5Writer::H5Writer(const Team& team, const Path& file, std::uint64_t bytes)
-    : team_(team), file_(file), temporary_(file.string() + ".tmp")
+H5Writer::H5Writer(const Team& team, const Path& file, std::uint64_t bytes) : team_(team), file_(file), temporary_(file.string() + ".tmp")
 {
     on_root(team, [&] {
         // Better known beforehand than half way through.
         const auto free = free_bytes(directory_of(file));
         if (free < bytes)
-            throw IoFailed(fmt::format(
-                "{}: the disk is full: {:.1f} MB are needed and {:.1f} MB are free: make room or choose "
-                "another directory with -o, then go on with --restart",
-                file.string(), double(bytes) / 1e6, double(free) / 1e6));
+            throw IoFailed(fmt::format("{}: the disk is full: {:.1f} MB are needed and {:.1f} MB are free: make room or choose "
+                                       "another directory with -o, then go on with --restart",
+                                       file.string(), double(bytes) / 1e6, double(free) / 1e6));
         be_quiet();
         const Handle access(access_for_our_files(), H5Pclose);
         id_ = H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
         check(id_ >= 0, "creating the file");
-        if (id_ < 0)
-            throw IoFailed(complaint_);
+        if (id_ < 0) throw IoFailed(complaint_);
     });
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
-    const std::string trouble =
-        descriptor_ >= 0 ? ""
-                         : fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
+    const std::string trouble = descriptor_ >= 0 ? "" : fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
     try {
         agree(team, trouble);
     } catch (...) {
@@ -143,52 +131,41 @@ H5Writer::~H5Writer() { close_and_remove(); }
 
 void H5Writer::close_and_remove()
 {
-    if (descriptor_ >= 0)
-        ::close(descriptor_);
-    if (id_ >= 0)
-        H5Fclose(id_);
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (id_ >= 0) H5Fclose(id_);
     std::error_code ignored;
-    if (!finished_ && team_.rank() == 0)
-        std::filesystem::remove(temporary_, ignored);
+    if (!finished_ && team_.rank() == 0) std::filesystem::remove(temporary_, ignored);
 }
 
 void H5Writer::group(const std::string& name)
 {
-    if (team_.rank() != 0)
-        return;
+    if (team_.rank() != 0) return;
     const Handle made(H5Gcreate2(id_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     check(made.ok(), "creating group " + name);
 }
 
-void H5Writer::write_attribute(const std::string& object, const std::string& name, std::int64_t type,
-                               std::int64_t count, const void* value)
+void H5Writer::write_attribute(const std::string& object, const std::string& name, std::int64_t type, std::int64_t count, const void* value)
 {
     const hsize_t n = hsize_t(count);
     const Handle space(count ? H5Screate_simple(1, &n, nullptr) : H5Screate(H5S_SCALAR), H5Sclose);
-    const Handle a(H5Acreate_by_name(id_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT,
-                                     H5P_DEFAULT),
-                   H5Aclose);
+    const Handle a(H5Acreate_by_name(id_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     check(a.ok() && H5Awrite(a, type, value) >= 0, fmt::format("writing attribute {} of {}", name, object));
 }
 void H5Writer::attribute(const std::string& object, const std::string& name, double v)
 {
-    if (team_.rank() == 0)
-        write_attribute(object, name, H5T_NATIVE_DOUBLE, 0, &v);
+    if (team_.rank() == 0) write_attribute(object, name, H5T_NATIVE_DOUBLE, 0, &v);
 }
 void H5Writer::attribute(const std::string& object, const std::string& name, std::int64_t v)
 {
-    if (team_.rank() == 0)
-        write_attribute(object, name, H5T_NATIVE_INT64, 0, &v);
+    if (team_.rank() == 0) write_attribute(object, name, H5T_NATIVE_INT64, 0, &v);
 }
 void H5Writer::attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> v)
 {
-    if (team_.rank() == 0)
-        write_attribute(object, name, H5T_NATIVE_INT64, std::int64_t(v.size()), v.data());
+    if (team_.rank() == 0) write_attribute(object, name, H5T_NATIVE_INT64, std::int64_t(v.size()), v.data());
 }
 void H5Writer::attribute(const std::string& object, const std::string& name, std::string_view v)
 {
-    if (team_.rank() != 0)
-        return;
+    if (team_.rank() != 0) return;
     const std::string text = v.empty() ? std::string(1, '\0') : std::string(v);
     const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
     H5Tset_size(type, text.size());
@@ -196,8 +173,7 @@ void H5Writer::attribute(const std::string& object, const std::string& name, std
     write_attribute(object, name, type, 0, text.data());
 }
 
-void H5Writer::write(const std::string& name, Number number, const void* rows, std::size_t count,
-                     int components)
+void H5Writer::write(const std::string& name, Number number, const void* rows, std::size_t count, int components)
 {
     const std::int64_t first = team_.sum_below(std::int64_t(count)), total = team_.sum(std::int64_t(count));
     const std::size_t row = bytes_of(number) * std::size_t(components);
@@ -211,18 +187,15 @@ void H5Writer::write(const std::string& name, Number number, const void* rows, s
         H5Pset_layout(create, H5D_CONTIGUOUS);
         H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
         H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
-        const Handle table(
-            H5Dcreate2(id_, name.c_str(), native(number), space, H5P_DEFAULT, create, H5P_DEFAULT), H5Dclose);
+        const Handle table(H5Dcreate2(id_, name.c_str(), native(number), space, H5P_DEFAULT, create, H5P_DEFAULT), H5Dclose);
         check(table.ok(), "creating table " + name);
         const haddr_t offset = table.ok() && total > 0 ? H5Dget_offset(table) : 0;
         check(offset != HADDR_UNDEF, "placing table " + name);
         start = complaint_.empty() ? std::int64_t(offset) : -1;
     }
     team_.broadcast(std::as_writable_bytes(std::span(&start, 1)));
-    if (start < 0)
-        agree(team_, complaint_);
-    if (!complaint_.empty())
-        return; // all hear of it in finish()
+    if (start < 0) agree(team_, complaint_);
+    if (!complaint_.empty()) return; // all hear of it in finish()
 
     const char* from = static_cast<const char*>(rows);
     std::size_t left = count * row;
@@ -230,11 +203,9 @@ void H5Writer::write(const std::string& name, Number number, const void* rows, s
     while (left > 0) {
         const std::size_t most = std::size_t(1) << 30; // Linux writes at most 2 GiB at a time
         const auto n = ::pwrite(descriptor_, from, std::min(left, most), at);
-        if (n < 0 && errno == EINTR)
-            continue;
+        if (n < 0 && errno == EINTR) continue;
         if (n <= 0) {
-            complaint_ = fmt::format("{}: writing table {} failed: {}", file_.string(), name,
-                                     cause(file_, n < 0 ? errno : ENOSPC));
+            complaint_ = fmt::format("{}: writing table {} failed: {}", file_.string(), name, cause(file_, n < 0 ? errno : ENOSPC));
             return;
         }
         from += n, left -= std::size_t(n), at += n;
@@ -243,12 +214,10 @@ void H5Writer::write(const std::string& name, Number number, const void* rows, s
 
 void H5Writer::finish()
 {
-    if (finished_)
-        return;
+    if (finished_) return;
     // Each rank its own writes: on a network file system nobody else can.
     if (complaint_.empty() && ::fsync(descriptor_) != 0)
-        complaint_ =
-            fmt::format("{}: bringing it to the disk failed: {}", file_.string(), cause(file_, errno));
+        complaint_ = fmt::format("{}: bringing it to the disk failed: {}", file_.string(), cause(file_, errno));
     agree(team_, complaint_);
     if (team_.rank() == 0) {
         check(H5Fflush(id_, H5F_SCOPE_GLOBAL) >= 0, "flushing");
@@ -272,58 +241,44 @@ void H5Writer::publish()
 
 // ---- reading
 // -------------------------------------------------------------------------------------------------------
-void H5Reader::refuse(const std::string& why) const
-{
-    throw IoFailed(fmt::format("{}: {}", file_.string(), why));
-}
+void H5Reader::refuse(const std::string& why) const { throw IoFailed(fmt::format("{}: {}", file_.string(), why)); }
 
 H5Reader::H5Reader(const Path& file) : file_(file)
 {
     be_quiet();
     std::error_code error;
     const auto status = std::filesystem::status(file, error);
-    if (!std::filesystem::exists(status))
-        refuse("there is no such file");
-    if (!std::filesystem::is_regular_file(status))
-        refuse("expected a file, found something else");
+    if (!std::filesystem::exists(status)) refuse("there is no such file");
+    if (!std::filesystem::is_regular_file(status)) refuse("expected a file, found something else");
     file_bytes_ = std::filesystem::file_size(file, error);
-    if (error)
-        refuse("asking for its size failed: " + error.message());
+    if (error) refuse("asking for its size failed: " + error.message());
     const Handle access(access_for_our_files(), H5Pclose);
     id_ = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
     if (id_ < 0) {
         const auto c = last_complaint();
-        refuse(fmt::format(
-            "not a readable HDF5 file: damaged, cut short or of another kind ({} bytes; HDF5: {})",
-            file_bytes_, c.words));
+        refuse(fmt::format("not a readable HDF5 file: damaged, cut short or of another kind ({} bytes; HDF5: {})", file_bytes_, c.words));
     }
 }
 
 H5Reader::~H5Reader()
 {
-    if (id_ >= 0)
-        H5Fclose(id_);
+    if (id_ >= 0) H5Fclose(id_);
 }
 
 bool H5Reader::has(const std::string& name) const
 {
     for (auto slash = name.find('/', 1);; slash = name.find('/', slash + 1)) {
-        if (H5Lexists(id_, name.substr(0, slash).c_str(), H5P_DEFAULT) <= 0)
-            return false;
-        if (slash == std::string::npos)
-            return true;
+        if (H5Lexists(id_, name.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+        if (slash == std::string::npos) return true;
     }
 }
 
 H5Reader::Table H5Reader::table(const std::string& name) const
 {
-    if (!has(name))
-        refuse(fmt::format("table {} is missing: not a file of this kind, or damaged", name));
+    if (!has(name)) refuse(fmt::format("table {} is missing: not a file of this kind, or damaged", name));
     const Handle data(H5Dopen2(id_, name.c_str(), H5P_DEFAULT), H5Dclose);
-    if (!data.ok())
-        refuse(fmt::format("table {} is damaged (HDF5: {})", name, last_complaint().words));
-    const Handle space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose),
-        create(H5Dget_create_plist(data), H5Pclose);
+    if (!data.ok()) refuse(fmt::format("table {} is damaged (HDF5: {})", name, last_complaint().words));
+    const Handle space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose), create(H5Dget_create_plist(data), H5Pclose);
     hsize_t size[2] = {0, 1};
     const int rank = space.ok() ? H5Sget_simple_extent_ndims(space) : -1;
     if (rank < 1 || rank > 2 || H5Sget_simple_extent_dims(space, size, nullptr) < 0)
@@ -331,49 +286,38 @@ H5Reader::Table H5Reader::table(const std::string& name) const
     Table t{};
     bool known = false;
     for (const Number n : {Number::Float64, Number::Int64, Number::Int32, Number::UInt8})
-        if (H5Tequal(type, native(n)) > 0)
-            t.number = n, known = true;
-    if (!known)
-        refuse(fmt::format("table {} holds numbers of a type kuzure does not write", name));
-    if (size[1] < 1 || size[1] > 64)
-        refuse(fmt::format("table {} has {} columns", name, size[1]));
+        if (H5Tequal(type, native(n)) > 0) t.number = n, known = true;
+    if (!known) refuse(fmt::format("table {} holds numbers of a type kuzure does not write", name));
+    if (size[1] < 1 || size[1] > 64) refuse(fmt::format("table {} has {} columns", name, size[1]));
     t.rows = size[0];
     t.components = int(size[1]);
     const auto row = bytes_of(t.number) * size[1];
-    if (t.rows > file_bytes_ / row)
-        refuse(
-            fmt::format("table {} claims {} rows of {} bytes, more than the file holds", name, t.rows, row));
+    if (t.rows > file_bytes_ / row) refuse(fmt::format("table {} claims {} rows of {} bytes, more than the file holds", name, t.rows, row));
 
     // What could lead out of the file or blow up in memory (filters, chunks, links to other files): not ours.
     const auto layout = H5Pget_layout(create);
     const bool ours = layout == H5D_CONTIGUOUS && H5Pget_external_count(create) == 0;
-    if (!ours)
-        refuse(fmt::format("table {} is stored in a way kuzure does not write", name));
+    if (!ours) refuse(fmt::format("table {} is stored in a way kuzure does not write", name));
     return t;
 }
 
-void H5Reader::check_rows(const std::string& name, Number number, std::uint64_t first, std::uint64_t count,
-                          int components) const
+void H5Reader::check_rows(const std::string& name, Number number, std::uint64_t first, std::uint64_t count, int components) const
 {
     const Table t = table(name);
     if (t.number != number || t.components != components)
-        refuse(fmt::format("table {} has {} columns or another number type than the {} expected", name,
-                           t.components, components));
+        refuse(fmt::format("table {} has {} columns or another number type than the {} expected", name, t.components, components));
     if (first > t.rows || count > t.rows - first)
         refuse(fmt::format("table {} has {} rows, fewer than the {} expected", name, t.rows, first + count));
 }
 
-void H5Reader::read(const std::string& name, Number number, std::uint64_t first, std::uint64_t count,
-                    int components, void* into) const
+void H5Reader::read(const std::string& name, Number number, std::uint64_t first, std::uint64_t count, int components, void* into) const
 {
-    if (count == 0)
-        return;
+    if (count == 0) return;
     const int rank = components > 1 ? 2 : 1;
     const hsize_t start[2] = {first, 0}, size[2] = {count, hsize_t(components)};
-    const Handle data(H5Dopen2(id_, name.c_str(), H5P_DEFAULT), H5Dclose),
-        in_file(H5Dget_space(data), H5Sclose), in_memory(H5Screate_simple(rank, size, nullptr), H5Sclose);
-    if (H5Sget_simple_extent_ndims(in_file) != rank ||
-        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, size, nullptr) < 0 ||
+    const Handle data(H5Dopen2(id_, name.c_str(), H5P_DEFAULT), H5Dclose), in_file(H5Dget_space(data), H5Sclose),
+        in_memory(H5Screate_simple(rank, size, nullptr), H5Sclose);
+    if (H5Sget_simple_extent_ndims(in_file) != rank || H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, size, nullptr) < 0 ||
         H5Dread(data, native(number), in_memory, in_file, H5P_DEFAULT, into) < 0) {
         const auto c = last_complaint();
         refuse(fmt::format("table {} cannot be read: damaged (HDF5: {})", name, c.words));
@@ -383,8 +327,7 @@ void H5Reader::read(const std::string& name, Number number, std::uint64_t first,
 double H5Reader::real(const std::string& object, const std::string& attribute) const
 {
     double v = 0;
-    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT),
-                   H5Aclose);
+    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
     if (!space.ok() || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(a, H5T_NATIVE_DOUBLE, &v) < 0)
         refuse(fmt::format("attribute {} of {} is missing or damaged", attribute, object));
@@ -394,8 +337,7 @@ double H5Reader::real(const std::string& object, const std::string& attribute) c
 std::int64_t H5Reader::integer(const std::string& object, const std::string& attribute) const
 {
     std::int64_t v = 0;
-    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT),
-                   H5Aclose);
+    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
     if (!space.ok() || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(a, H5T_NATIVE_INT64, &v) < 0)
         refuse(fmt::format("attribute {} of {} is missing or damaged", attribute, object));
@@ -404,12 +346,10 @@ std::int64_t H5Reader::integer(const std::string& object, const std::string& att
 
 std::string H5Reader::text(const std::string& object, const std::string& attribute) const
 {
-    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT),
-                   H5Aclose);
+    const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle type(a.ok() ? H5Aget_type(a) : -1, H5Tclose), space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
-    const bool plain = type.ok() && space.ok() && H5Tget_class(type) == H5T_STRING &&
-                       H5Tis_variable_str(type) == 0 && H5Sget_simple_extent_npoints(space) == 1 &&
-                       H5Tget_size(type) <= 65536;
+    const bool plain = type.ok() && space.ok() && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
+                       H5Sget_simple_extent_npoints(space) == 1 && H5Tget_size(type) <= 65536;
     std::string v(plain ? H5Tget_size(type) : 0, '\0');
     if (!plain || H5Aread(a, type, v.data()) < 0)
         refuse(fmt::format("attribute {} of {} is missing, damaged or not a short text", attribute, object));

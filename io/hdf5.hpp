@@ -4,8 +4,7 @@
 #include "io/file.hpp"
 #include <vector>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// Number types a table may hold.
 enum class Number { Float64, Int64, Int32, UInt8 };
@@ -20,9 +19,8 @@ std::size_t bytes_of(Number);
 /// data without a word or hangs (tests/mpi/io_test.cpp), while the system's own calls say what failed on the
 /// rank where it did. All calls are collective and in the same order. Failures may be collected; table() and
 /// finish() throw IoFailed, on all ranks.
-class H5Writer
-{
-  public:
+class H5Writer {
+public:
     /// Creates `file`.tmp; `bytes` (all ranks together, roughly) are asked of the disk beforehand.
     H5Writer(const Team&, const Path& file, std::uint64_t bytes);
     /// Closes; a file that was not finished is removed.
@@ -48,10 +46,9 @@ class H5Writer
     void publish();
     const Path& temporary() const { return temporary_; }
 
-  private:
+private:
     void write(const std::string& name, Number, const void* rows, std::size_t count, int components);
-    void write_attribute(const std::string& object, const std::string& name, std::int64_t type,
-                         std::int64_t count, const void*);
+    void write_attribute(const std::string& object, const std::string& name, std::int64_t type, std::int64_t count, const void*);
     void check(bool ok, const std::string& doing);
     void close_and_remove();
 
@@ -65,9 +62,8 @@ class H5Writer
 
 /// An HDF5 file read by this rank alone. Trusts nothing: a table is looked at before memory is taken for it.
 /// Not collective; throws IoFailed on this rank only (see agree()).
-class H5Reader
-{
-  public:
+class H5Reader {
+public:
     explicit H5Reader(const Path& file);
     ~H5Reader();
     H5Reader(const H5Reader&) = delete;
@@ -84,8 +80,7 @@ class H5Reader
     Table table(const std::string& name) const;
     /// Rows first .. first+count-1 of a table of T with that many components.
     template <class T>
-    void rows(const std::string& name, std::uint64_t first, std::uint64_t count, int components,
-              std::vector<T>& into) const
+    void rows(const std::string& name, std::uint64_t first, std::uint64_t count, int components, std::vector<T>& into) const
     {
         check_rows(name, number_of<T>, first, count, components);
         into.resize(std::size_t(count) * std::size_t(components));
@@ -97,11 +92,9 @@ class H5Reader
     const Path& file() const { return file_; }
     [[noreturn]] void refuse(const std::string& why) const;
 
-  private:
-    void check_rows(const std::string& name, Number, std::uint64_t first, std::uint64_t count,
-                    int components) const;
-    void read(const std::string& name, Number, std::uint64_t first, std::uint64_t count, int components,
-              void* into) const;
+private:
+    void check_rows(const std::string& name, Number, std::uint64_t first, std::uint64_t count, int components) const;
+    void read(const std::string& name, Number, std::uint64_t first, std::uint64_t count, int components, void* into) const;
 
     Path file_;
     std::int64_t id_ = -1;

@@ -4,8 +4,7 @@
 #include "io/file.hpp"
 #include <optional>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// One row, in the order of the file. Energies in J (2-D: J per m of thickness).
 struct HistoryRow {
@@ -18,9 +17,8 @@ struct HistoryRow {
     double height, front_min_x, front_max_x, front_min_y, front_max_y;   // m
 };
 
-class History
-{
-  public:
+class History {
+public:
     /// Collective. Starts a new file; with a restart time, goes on after the last row not later than it,
     /// dropping later and torn rows. Throws IoFailed, also where the file is not a history of kuzure.
     History(const Team&, const Path& file, int dimensions, std::optional<double> restart_time = {});
@@ -36,7 +34,7 @@ class History
     /// Time of the last row in the file, if there is one: a restart must not write it again.
     std::optional<double> last_time() const { return last_time_; }
 
-  private:
+private:
     const Team& team_;
     Path file_;
     std::optional<double> last_time_;

@@ -5,10 +5,8 @@
 #include <fmt/format.h>
 #include <numbers>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 constexpr int fine = 2;               // samples per pixel along each axis
 constexpr int shadow_reach = 8;       // samples over which nearer ground darkens
@@ -44,9 +42,7 @@ Rgb pick(const Map& map, double t)
     const double s = std::clamp(t, 0.0, 1.0) * double(map.size() - 1);
     const auto k = std::min(std::size_t(s), map.size() - 2);
     const double f = s - double(k);
-    const auto mixed = [&](std::uint8_t a, std::uint8_t b) {
-        return std::uint8_t(std::lround(a + f * (b - a)));
-    };
+    const auto mixed = [&](std::uint8_t a, std::uint8_t b) { return std::uint8_t(std::lround(a + f * (b - a))); };
     return {mixed(map[k].r, map[k + 1].r), mixed(map[k].g, map[k + 1].g), mixed(map[k].b, map[k + 1].b)};
 }
 
@@ -97,43 +93,34 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
 {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (const double v : values)
-        if (std::isfinite(v))
-            low = std::min(low, v), high = std::max(high, v);
+        if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
     low = team.min(low), high = team.max(high);
-    if (low > high)
-        return {0, 1};
+    if (low > high) return {0, 1};
     const bool from_zero = color != scene::Color::Pressure;
-    if (from_zero)
-        low = std::min(low, 0.0);
+    if (from_zero) low = std::min(low, 0.0);
     Range r{low, high};
     if (high > low) {
         std::vector<std::int64_t> count(2048);
         const double per_bin = double(count.size()) / (high - low);
         for (const double v : values)
-            if (std::isfinite(v))
-                ++count[std::min(std::size_t((v - low) * per_bin), count.size() - 1)];
+            if (std::isfinite(v)) ++count[std::min(std::size_t((v - low) * per_bin), count.size() - 1)];
         team.sum(std::span<std::int64_t>(count));
         std::int64_t all = 0, seen = 0;
-        for (const auto c : count)
-            all += c;
+        for (const auto c : count) all += c;
         const auto cut = [&](auto first, auto last) {
             seen = 0;
             auto bin = first;
-            while (bin != last && (seen += *bin) * 1000 < all)
-                ++bin;
+            while (bin != last && (seen += *bin) * 1000 < all) ++bin;
             return bin;
         };
         const double top = high - double(cut(count.rbegin(), count.rend()) - count.rbegin()) / per_bin;
         const double bottom = low + double(cut(count.begin(), count.end()) - count.begin()) / per_bin;
-        if (top < low + 0.8 * (high - low))
-            r.high = top, r.above = true;
-        if (!from_zero && bottom > low + 0.2 * (high - low))
-            r.low = bottom, r.below = true;
+        if (top < low + 0.8 * (high - low)) r.high = top, r.above = true;
+        if (!from_zero && bottom > low + 0.2 * (high - low)) r.low = bottom, r.below = true;
     } else {
         r.high = r.low + 1;
     }
-    if (color == scene::Color::Displacement && (r.high < spacing || high == low))
-        r = {0, spacing, false, high > spacing};
+    if (color == scene::Color::Displacement && (r.high < spacing || high == low)) r = {0, spacing, false, high > spacing};
     return r;
 }
 
@@ -142,18 +129,15 @@ double round_up(double x)
 {
     const double power = std::pow(10.0, std::floor(std::log10(x)));
     for (const double m : {1.0, 2.0, 5.0, 10.0})
-        if (m * power >= x * (1 - 1e-9))
-            return m * power;
+        if (m * power >= x * (1 - 1e-9)) return m * power;
     return 10 * power;
 }
 
 std::string number(double v, double step)
 {
-    if (std::fabs(v) < 1e-9 * step)
-        v = 0;
+    if (std::fabs(v) < 1e-9 * step) v = 0;
     const int digits = std::clamp(int(std::ceil(-std::log10(step) - 1e-9)), 0, 12);
-    if (step >= 1e5 || step < 1e-4)
-        return fmt::format("{:.3g}", v);
+    if (step >= 1e5 || step < 1e-4) return fmt::format("{:.3g}", v);
     return fmt::format("{:.{}f}", v, digits);
 }
 
@@ -167,10 +151,8 @@ struct Camera {
     explicit Camera(scene::View view)
     {
         double azimuth = -90, elevation = 0; // deg, where the eye stands
-        if (view == scene::View::Oblique)
-            azimuth = -60, elevation = 24;
-        if (view == scene::View::Top)
-            elevation = 90;
+        if (view == scene::View::Oblique) azimuth = -60, elevation = 24;
+        if (view == scene::View::Top) elevation = 90;
         const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
         right = {-std::sin(a), std::cos(a), 0};
         up = {-std::sin(e) * std::cos(a), -std::sin(e) * std::sin(a), std::cos(e)};
@@ -185,11 +167,9 @@ struct Camera {
     {
         double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
         for (int k = 0; k < 8; ++k) {
-            const Vector corner{k & 1 ? box.high.x : box.low.x, k & 2 ? box.high.y : box.low.y,
-                                k & 4 ? box.high.z : box.low.z};
+            const Vector corner{k & 1 ? box.high.x : box.low.x, k & 2 ? box.high.y : box.low.y, k & 4 ? box.high.z : box.low.z};
             const double at[2] = {dot(right, corner), dot(up, corner)};
-            for (int c = 0; c < 2; ++c)
-                lo[c] = std::min(lo[c], at[c]), hi[c] = std::max(hi[c], at[c]);
+            for (int c = 0; c < 2; ++c) lo[c] = std::min(lo[c], at[c]), hi[c] = std::max(hi[c], at[c]);
         }
         scale = std::min(width / (hi[0] - lo[0]), height / (hi[1] - lo[1]));
         x0 = left + 0.5 * width - scale * 0.5 * (lo[0] + hi[0]);
@@ -225,10 +205,7 @@ struct Strip {
     int width, first, rows;
     std::vector<Sample> sample;
     Sample& at(int x, int y) { return sample[std::size_t(y - first) * std::size_t(width) + std::size_t(x)]; }
-    Sample at(int x, int y) const
-    {
-        return sample[std::size_t(y - first) * std::size_t(width) + std::size_t(x)];
-    }
+    Sample at(int x, int y) const { return sample[std::size_t(y - first) * std::size_t(width) + std::size_t(x)]; }
     bool holds(int x, int y) const { return x >= 0 && x < width && y >= first && y < first + rows; }
 };
 
@@ -240,8 +217,7 @@ struct Ball {
 Ball ball(double dx, double dy)
 {
     const double nz = std::sqrt(std::max(0.0, 1 - dx * dx - dy * dy));
-    const double diffuse =
-        std::max(0.0, -0.42 * dx - 0.60 * dy + 0.68 * nz); // light from the upper left, behind the eye
+    const double diffuse = std::max(0.0, -0.42 * dx - 0.60 * dy + 0.68 * nz); // light from the upper left, behind the eye
     return {0.42 + 0.66 * diffuse, nz};
 }
 
@@ -253,22 +229,15 @@ void draw(Strip& strip, const std::vector<Splat>& splats, double radius, double 
     for (int band = 0; band < bands; ++band) {
         const int top = strip.first + band * rows, bottom = std::min(strip.first + strip.rows, top + rows);
         for (const Splat& s : splats) {
-            if (s.y + radius < top || s.y - radius >= bottom || s.x + radius < 0 ||
-                s.x - radius >= strip.width)
-                continue;
-            const int y0 = std::max(top, int(std::floor(s.y - radius))),
-                      y1 = std::min(bottom - 1, int(s.y + radius));
-            const int x0 = std::max(0, int(std::floor(s.x - radius))),
-                      x1 = std::min(strip.width - 1, int(s.x + radius));
+            if (s.y + radius < top || s.y - radius >= bottom || s.x + radius < 0 || s.x - radius >= strip.width) continue;
+            const int y0 = std::max(top, int(std::floor(s.y - radius))), y1 = std::min(bottom - 1, int(s.y + radius));
+            const int x0 = std::max(0, int(std::floor(s.x - radius))), x1 = std::min(strip.width - 1, int(s.x + radius));
             for (int y = y0; y <= y1; ++y)
                 for (int x = x0; x <= x1; ++x) {
                     const double dx = (x + 0.5 - s.x) / radius, dy = (y + 0.5 - s.y) / radius;
-                    if (dx * dx + dy * dy > 1)
-                        continue;
+                    if (dx * dx + dy * dy > 1) continue;
                     const Ball b = ball(dx, dy);
-                    const auto shade = [&](std::uint8_t c) {
-                        return std::uint8_t(std::min(255.0, c * b.light));
-                    };
+                    const auto shade = [&](std::uint8_t c) { return std::uint8_t(std::min(255.0, c * b.light)); };
                     const Rgb lit{shade(s.color.r), shade(s.color.g), shade(s.color.b)};
                     auto& sample = strip.at(x, y);
                     sample = std::max(sample, depths.pack(s.depth + sphere * b.height, lit));
@@ -286,8 +255,7 @@ double openness(const Strip& strip, int x, int y, const Depths& depths, double s
         for (int k = 0; k < 8; ++k) {
             const int dx[] = {1, 1, 0, -1, -1, -1, 0, 1}, dy[] = {0, 1, 1, 1, 0, -1, -1, -1};
             const int a = x + reach * dx[k], b = y + reach * dy[k];
-            if (!strip.holds(a, b) || strip.at(a, b) == nothing)
-                continue;
+            if (!strip.holds(a, b) || strip.at(a, b) == nothing) continue;
             blocked += std::clamp((depths.depth(strip.at(a, b)) - here) / (3 * spacing) - 0.1, 0.0, 1.0) / 16;
         }
     return std::exp(-1.1 * blocked);
@@ -297,11 +265,9 @@ double openness(const Strip& strip, int x, int y, const Depths& depths, double s
 // ----------------------------------------------------------------------------------------------
 void color_bar(Canvas& canvas, const Quantity& q, const Range& range)
 {
-    const int width = 26, height = canvas.height() / 2, left = canvas.width() - 190,
-              top = (canvas.height() - height) / 2 + 10;
+    const int width = 26, height = canvas.height() / 2, left = canvas.width() - 190, top = (canvas.height() - height) / 2 + 10;
     canvas.rectangle(left - 1, top - 1, width + 2, height + 2, ink);
-    for (int y = 0; y < height; ++y)
-        canvas.rectangle(left, top + y, width, 1, pick(q.map, 1 - (y + 0.5) / height));
+    for (int y = 0; y < height; ++y) canvas.rectangle(left, top + y, width, 1, pick(q.map, 1 - (y + 0.5) / height));
     const std::string unit = *q.unit ? fmt::format(" [{}]", q.unit) : "";
     canvas.text(left + 65, top - 28, 15, q.name + unit, ink, Anchor::Middle);
     const double step = round_up((range.high - range.low) / 7);
@@ -310,33 +276,26 @@ void color_bar(Canvas& canvas, const Quantity& q, const Range& range)
         canvas.line(left + width, y, left + width + 7, y, 1.5, ink);
         canvas.text(left + width + 14, y + 6.5, 13, number(v, step), ink);
     }
-    if (range.above)
-        canvas.text(left + width / 2.0, top - 7, 11, "^", ink, Anchor::Middle);
-    if (range.below)
-        canvas.text(left + width / 2.0, top + height + 16, 11, "v", ink, Anchor::Middle);
+    if (range.above) canvas.text(left + width / 2.0, top - 7, 11, "^", ink, Anchor::Middle);
+    if (range.below) canvas.text(left + width / 2.0, top + height + 16, 11, "v", ink, Anchor::Middle);
 }
 
 void scale_bar(Canvas& canvas, double pixels_per_metre)
 {
     const double most = 0.2 * canvas.width() / pixels_per_metre;
     double metres = round_up(most);
-    while (metres > most)
-        metres = round_up(0.39 * metres); // 10 -> 5 -> 2 -> 1
+    while (metres > most) metres = round_up(0.39 * metres); // 10 -> 5 -> 2 -> 1
     const double length = metres * pixels_per_metre, x = 60, y = canvas.height() - 42;
     canvas.line(x, y, x + length, y, 2.5, ink);
-    for (const double end : {x, x + length})
-        canvas.line(end, y - 7, end, y + 7, 2.5, ink);
-    canvas.text(x + 0.5 * length, y - 14, 15,
-                metres < 0.01 ? fmt::format("{:g} mm", metres * 1000) : fmt::format("{:g} m", metres), ink,
+    for (const double end : {x, x + length}) canvas.line(end, y - 7, end, y + 7, 2.5, ink);
+    canvas.text(x + 0.5 * length, y - 14, 15, metres < 0.01 ? fmt::format("{:g} mm", metres * 1000) : fmt::format("{:g} m", metres), ink,
                 Anchor::Middle);
 }
 
 std::string cut_to_width(std::string title, double size, double width)
 {
-    if (Canvas::text_width(size, title) <= width)
-        return title;
-    while (!title.empty() && Canvas::text_width(size, title + "...") > width)
-        title.pop_back();
+    if (Canvas::text_width(size, title) <= width) return title;
+    while (!title.empty() && Canvas::text_width(size, title + "...") > width) title.pop_back();
     return title + "...";
 }
 
@@ -348,20 +307,17 @@ Extent soil_extent(const Team& team, const Particles& p)
     const auto x = p[field::position];
     for (int c = 0; c < 3; ++c)
         for (Index i = 0; i < p.size(); ++i) {
-            if (!std::isfinite(x.column[c][i]))
-                continue;
+            if (!std::isfinite(x.column[c][i])) continue;
             low[c] = std::min(low[c], x.column[c][i]);
             high[c] = std::max(high[c], x.column[c][i]);
         }
     team.min(std::span<double>(low));
     team.max(std::span<double>(high));
-    if (!(low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2]))
-        return {};
+    if (!(low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2])) return {};
     return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-void write_picture(const Team& team, const Path& file, const Particles& p, const WallPoints& walls,
-                   const PictureLabel& label)
+void write_picture(const Team& team, const Path& file, const Particles& p, const WallPoints& walls, const PictureLabel& label)
 {
     ensure(label.spacing > 0, "a picture needs the particles' spacing");
     const bool flat = label.dimensions == 2;
@@ -371,11 +327,9 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
     const double d = label.spacing;
 
     // The soil, a margin of floor around it, and a little of the floor's thickness.
-    const double margin = std::max(
-        {floor_margin * (label.high.x - label.low.x), floor_margin * (label.high.y - label.low.y), 4 * d});
-    const Extent shown{
-        {label.low.x - margin, flat ? -d : label.low.y - margin, label.low.z - 3.1 * d},
-        {label.high.x + margin, flat ? d : label.high.y + margin, label.high.z + std::max(margin, 4 * d)}};
+    const double margin = std::max({floor_margin * (label.high.x - label.low.x), floor_margin * (label.high.y - label.low.y), 4 * d});
+    const Extent shown{{label.low.x - margin, flat ? -d : label.low.y - margin, label.low.z - 3.1 * d},
+                       {label.high.x + margin, flat ? d : label.high.y + margin, label.high.z + std::max(margin, 4 * d)}};
     Extent framed = shown;
     framed.high.z = label.high.z + d;
     camera.fit(framed, fine * 60.0, fine * 90.0, fine * (label.width - 300.0), fine * (label.height - 190.0));
@@ -383,37 +337,28 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
     // What each particle of this rank looks like.
     const auto n = p.size();
     std::vector<double> values(std::size_t(n), 0.0);
-    for (Index i = 0; i < n; ++i)
-        values[std::size_t(i)] = value(p, label.look.color, i);
+    for (Index i = 0; i < n; ++i) values[std::size_t(i)] = value(p, label.look.color, i);
     Range range = natural_range(team, values, label.look.color, d);
-    if (label.range)
-        range = {(*label.range)[0], (*label.range)[1],
-                 range.low<(*label.range)[0], range.high>(*label.range)[1]};
+    if (label.range) range = {(*label.range)[0], (*label.range)[1], range.low<(*label.range)[0], range.high>(*label.range)[1]};
     ensure(range.high > range.low, "the range of a picture's colours is empty");
 
     std::vector<Splat> splats;
     splats.reserve(std::size_t(n) + walls.size());
     const auto x = p[field::position];
     const auto add = [&](Vector at, Rgb color) {
-        if (flat)
-            at.y = 0;
+        if (flat) at.y = 0;
         if (std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z))
             splats.push_back({float(camera.x(at)), float(camera.y(at)), float(camera.depth(at)), color});
     };
-    for (Index i = 0; i < n; ++i)
-        add(x[i], pick(q.map, (values[std::size_t(i)] - range.low) / (range.high - range.low)));
+    for (Index i = 0; i < n; ++i) add(x[i], pick(q.map, (values[std::size_t(i)] - range.low) / (range.high - range.low)));
     for (const Vector& w : walls.position) {
-        bool seen = w.x > shown.low.x && w.x < shown.high.x &&
-                    (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
+        bool seen = w.x > shown.low.x && w.x < shown.high.x && (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
                     w.z < shown.high.z;
         // A wall between the soil and the eye would hide what the picture is for.
         const bool above_floor = w.z > label.low.z - 0.25 * d;
-        if (!flat && above_floor && w.y < label.low.y)
-            seen = false;
-        if (!flat && !side && above_floor && w.x > label.high.x)
-            seen = false;
-        if (seen)
-            add(w, wall_brown);
+        if (!flat && above_floor && w.y < label.low.y) seen = false;
+        if (!flat && !side && above_floor && w.x > label.high.x) seen = false;
+        if (seen) add(w, wall_brown);
     }
     double near_far[2] = {HUGE_VAL, HUGE_VAL}; // least depth, least of -depth
     for (const Splat& s : splats) {
@@ -421,8 +366,7 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         near_far[1] = std::min(near_far[1], -double(s.depth));
     }
     team.min(std::span<double>(near_far));
-    if (near_far[0] > -near_far[1])
-        near_far[0] = near_far[1] = 0;
+    if (near_far[0] > -near_far[1]) near_far[0] = near_far[1] = 0;
     const Depths depths{near_far[0], 2147483647.0 / (-near_far[1] - near_far[0] + d)};
 
     // A little larger than the lattice needs, so that no gaps show; never so small that samples are missed.
@@ -437,8 +381,7 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         strip.sample.assign(std::size_t(strip.width) * std::size_t(strip.rows), nothing);
         draw(strip, splats, radius, 0.56 * d, depths);
         team.max(std::span<std::int64_t>(strip.sample));
-        if (team.rank() != 0)
-            continue;
+        if (team.rank() != 0) continue;
 #pragma omp parallel for schedule(static)
         for (int y = top; y < bottom; ++y)
             for (int px = 0; px < label.width; ++px) {
@@ -457,8 +400,7 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
     on_root(team, [&] {
         const std::string time = fmt::format("t = {:.3f} s", label.time);
         canvas.text(label.width - 60, 52, 20, time, ink, Anchor::Right);
-        canvas.text(60, 52, 18,
-                    cut_to_width(label.title, 18, label.width - 200 - Canvas::text_width(20, time)), ink);
+        canvas.text(60, 52, 18, cut_to_width(label.title, 18, label.width - 200 - Canvas::text_width(20, time)), ink);
         color_bar(canvas, q, range);
         scale_bar(canvas, camera.scale / fine);
         write_atomically(file, canvas.png());

@@ -8,8 +8,7 @@
 #include "solver/scene/scene.hpp"
 #include <optional>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 struct PictureLabel {
     scene::Picture look;

@@ -2,15 +2,13 @@
 // Where a run leaves its files: made once, never on top of another run's results.
 #include "io/file.hpp"
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// What to do with a directory that already holds something.
 enum class Existing { Refuse, GoOn, MoveAside };
 
-class ResultDirectory
-{
-  public:
+class ResultDirectory {
+public:
     /// Collective. Makes the directory and its parents. Throws BadInput where Existing forbids it or where
     /// the name belongs to a file (nothing is changed then), IoFailed where the system does. An empty
     /// directory is welcome.
@@ -27,7 +25,7 @@ class ResultDirectory
     Path summary() const { return path_ / "summary.json"; }
     Path stop() const { return path_ / "STOP"; }
 
-  private:
+private:
     Path path_, moved_to_;
 };
 

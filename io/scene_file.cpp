@@ -13,10 +13,8 @@
 #define TOML_ASSERT(expression) static_assert(true)
 #include <toml++/toml.h>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 const std::size_t largest_file = std::size_t(1) << 20;
 const std::size_t most_problems = 20;
@@ -38,8 +36,7 @@ std::string join(std::string_view head, std::string_view leaf)
 }
 std::optional<std::size_t> as_index(std::string_view text)
 {
-    if (text.empty() || text.size() > 9 || text.find_first_not_of("0123456789") != text.npos)
-        return {};
+    if (text.empty() || text.size() > 9 || text.find_first_not_of("0123456789") != text.npos) return {};
     return std::stoul(std::string(text));
 }
 
@@ -51,19 +48,12 @@ std::size_t malformed(std::string_view s)
     for (std::size_t i = 0; i < s.size();) {
         const auto byte = [&](std::size_t k) { return k < s.size() ? (unsigned char)(s[k]) : 0u; };
         const unsigned b = byte(i);
-        const int more = b < 0x80                ? 0
-                         : b >= 0xC2 && b < 0xE0 ? 1
-                         : b >= 0xE0 && b < 0xF0 ? 2
-                         : b >= 0xF0 && b < 0xF5 ? 3
-                                                 : -1;
-        if (more < 0)
-            return i;
+        const int more = b < 0x80 ? 0 : b >= 0xC2 && b < 0xE0 ? 1 : b >= 0xE0 && b < 0xF0 ? 2 : b >= 0xF0 && b < 0xF5 ? 3 : -1;
+        if (more < 0) return i;
         for (int k = 1; k <= more; ++k)
-            if ((byte(i + std::size_t(k)) & 0xC0) != 0x80)
-                return i;
+            if ((byte(i + std::size_t(k)) & 0xC0) != 0x80) return i;
         const unsigned second = byte(i + 1);
-        if ((b == 0xE0 && second < 0xA0) || (b == 0xED && second > 0x9F) || (b == 0xF0 && second < 0x90) ||
-            (b == 0xF4 && second > 0x8F))
+        if ((b == 0xE0 && second < 0xA0) || (b == 0xED && second > 0x9F) || (b == 0xF0 && second < 0x90) || (b == 0xF4 && second > 0x8F))
             return i;
         i += std::size_t(more) + 1;
     }
@@ -71,21 +61,19 @@ std::size_t malformed(std::string_view s)
 }
 std::size_t line_at(std::string_view text, std::size_t position)
 {
-    return 1 + std::size_t(std::count(text.begin(),
-                                      text.begin() + std::ptrdiff_t(std::min(position, text.size())), '\n'));
+    return 1 + std::size_t(std::count(text.begin(), text.begin() + std::ptrdiff_t(std::min(position, text.size())), '\n'));
 }
 /// Refuses what the TOML library must not see; `where` names line n of the source.
 template <class Where> void refuse_bad_bytes(std::string_view text, Where where)
 {
     if (const auto at = malformed(text); at != text.npos)
-        throw BadInput(
-            fmt::format("{}: expected UTF-8, found the byte 0x{:02x} that is none; save it as UTF-8",
-                        where(line_at(text, at)), (unsigned char)(text[at])));
+        throw BadInput(fmt::format("{}: expected UTF-8, found the byte 0x{:02x} that is none; save it as UTF-8", where(line_at(text, at)),
+                                   (unsigned char)(text[at])));
     // toml++ 3.3 takes these two for parts of a byte order mark and runs into undefined behaviour.
     for (const char* bad : {"\xEF\xB9\xBF", "\xEF\xBB\xBD"})
         if (const auto at = text.find(bad); at != text.npos)
-            throw BadInput(fmt::format("{}: expected text, found the character U+{}; remove it",
-                                       where(line_at(text, at)), bad[1] == '\xB9' ? "FE7F" : "FEFD"));
+            throw BadInput(fmt::format("{}: expected text, found the character U+{}; remove it", where(line_at(text, at)),
+                                       bad[1] == '\xB9' ? "FE7F" : "FEFD"));
 }
 
 // ---- the file as a tree, with the place of every key ----
@@ -95,26 +83,20 @@ struct Problem {
     std::string text; // with place and key
 };
 
-class Document
-{
-  public:
-    Document(std::string_view text, std::string name, std::span<const std::string> sets)
-        : name_(std::move(name))
+class Document {
+public:
+    Document(std::string_view text, std::string name, std::span<const std::string> sets) : name_(std::move(name))
     {
         if (text.size() > largest_file)
-            throw BadInput(
-                fmt::format("{}: expected a scene of at most 1 MiB, found {} bytes; is this a scene file?",
-                            name_, text.size()));
+            throw BadInput(fmt::format("{}: expected a scene of at most 1 MiB, found {} bytes; is this a scene file?", name_, text.size()));
         refuse_bad_bytes(text, [&](std::size_t line) { return fmt::format("{}:{}", name_, line); });
         try {
             root = toml::parse(text);
         } catch (const toml::parse_error& e) {
-            throw BadInput(
-                fmt::format("{}:{}: expected TOML, found an error in column {}: {}; correct this line", name_,
-                            e.source().begin.line, e.source().begin.column, e.description()));
+            throw BadInput(fmt::format("{}:{}: expected TOML, found an error in column {}: {}; correct this line", name_,
+                                       e.source().begin.line, e.source().begin.column, e.description()));
         }
-        for (const auto& set : sets)
-            override_with(set);
+        for (const auto& set : sets) override_with(set);
     }
 
     toml::table root;
@@ -124,22 +106,17 @@ class Document
     void complain(const std::string& path, const std::string& text)
     {
         auto [place, line] = place_and_line(path);
-        problems_.push_back({line, path.empty() ? fmt::format("{}: {}", place, text)
-                                                : fmt::format("{}: {}: {}", place, path, text)});
+        problems_.push_back({line, path.empty() ? fmt::format("{}: {}", place, text) : fmt::format("{}: {}: {}", place, path, text)});
     }
     /// More problems than will be shown.
     bool has_enough() const { return problems_.size() > 50 * most_problems; }
     void throw_if_any()
     {
-        if (problems_.empty())
-            return;
-        std::stable_sort(problems_.begin(), problems_.end(),
-                         [](const auto& a, const auto& b) { return a.line < b.line; });
+        if (problems_.empty()) return;
+        std::stable_sort(problems_.begin(), problems_.end(), [](const auto& a, const auto& b) { return a.line < b.line; });
         std::string all;
-        for (std::size_t i = 0; i < std::min(problems_.size(), most_problems); ++i)
-            all += (i ? "\n" : "") + problems_[i].text;
-        if (problems_.size() > most_problems)
-            all += fmt::format("\nand {} more", problems_.size() - most_problems);
+        for (std::size_t i = 0; i < std::min(problems_.size(), most_problems); ++i) all += (i ? "\n" : "") + problems_[i].text;
+        if (problems_.size() > most_problems) all += fmt::format("\nand {} more", problems_.size() - most_problems);
         throw BadInput(all);
     }
 
@@ -148,15 +125,12 @@ class Document
     {
         const toml::node* node = &root;
         for (const auto& part : split(path)) {
-            if (const auto* table = node->as_table())
-                node = table->get(part);
+            if (const auto* table = node->as_table()) node = table->get(part);
             else if (const auto* array = node->as_array()) {
                 const auto k = as_index(part);
                 node = k ? array->get(*k) : nullptr;
-            } else
-                node = nullptr;
-            if (!node)
-                return nullptr;
+            } else node = nullptr;
+            if (!node) return nullptr;
         }
         return node;
     }
@@ -164,35 +138,28 @@ class Document
     {
         std::size_t line = 1;
         const toml::node* node = &root;
-        if (path.empty())
-            return line;
+        if (path.empty()) return line;
         for (const auto& part : split(path)) {
             if (const auto* table = node->as_table()) {
                 const auto it = table->find(part);
-                if (it == table->end())
-                    break;
-                if (it->first.source().begin.line)
-                    line = it->first.source().begin.line;
+                if (it == table->end()) break;
+                if (it->first.source().begin.line) line = it->first.source().begin.line;
                 node = &it->second;
             } else if (const auto* array = node->as_array()) {
                 const auto k = as_index(part);
                 node = k ? array->get(*k) : nullptr;
-                if (!node)
-                    break;
-                if (node->source().begin.line)
-                    line = node->source().begin.line;
-            } else
-                break;
+                if (!node) break;
+                if (node->source().begin.line) line = node->source().begin.line;
+            } else break;
         }
         return line;
     }
 
-  private:
+private:
     std::pair<std::string, std::size_t> place_and_line(const std::string& path) const
     {
         for (auto it = sets_.rbegin(); it != sets_.rend(); ++it)
-            if (path == it->first || path.starts_with(it->first + "."))
-                return {"--set " + it->second, 0};
+            if (path == it->first || path.starts_with(it->first + ".")) return {"--set " + it->second, 0};
         const std::size_t line = line_of(path);
         return {fmt::format("{}:{}", name_, line), line};
     }
@@ -208,24 +175,21 @@ class Document
             s.erase(s.find_last_not_of(blank) + 1);
             return s;
         };
-        const std::string path = trim(set.substr(0, equals)),
-                          value = equals == set.npos ? "" : trim(set.substr(equals + 1));
+        const std::string path = trim(set.substr(0, equals)), value = equals == set.npos ? "" : trim(set.substr(equals + 1));
         const auto parts = split(path);
-        if (equals == set.npos || value.empty() ||
-            std::any_of(parts.begin(), parts.end(), [](const auto& p) { return p.empty(); }))
+        if (equals == set.npos || value.empty() || std::any_of(parts.begin(), parts.end(), [](const auto& p) { return p.empty(); }))
             throw BadInput(place + ": expected key.path=value, for example --set space.spacing=0.02");
 
         const Key* key = find_key(path);
-        const bool wants_text =
-            !key || key->kind == Kind::Text || key->kind == Kind::Choice || key->kind == Kind::ChoiceOrTable;
+        const bool wants_text = !key || key->kind == Kind::Text || key->kind == Kind::Choice || key->kind == Kind::ChoiceOrTable;
         toml::table parsed;
         try {
             parsed = toml::parse("v = " + value);
         } catch (const toml::parse_error& e) {
             // A shell takes the quotes off strings.
             if (!wants_text)
-                throw BadInput(fmt::format("{}: {}: expected {}, found {}; write, for example, {}={}", place,
-                                           path, key->expected(), value, path, key->example));
+                throw BadInput(fmt::format("{}: {}: expected {}, found {}; write, for example, {}={}", place, path, key->expected(), value,
+                                           path, key->example));
         }
         const bool whole = parsed.size() == 1 && parsed.contains("v");
         if (!whole || (key && key->kind == Kind::Text && !parsed["v"].is_string())) {
@@ -236,12 +200,10 @@ class Document
         toml::node* node = &root;
         for (std::size_t k = 0; k + 1 < parts.size(); ++k) {
             if (auto* table = node->as_table()) {
-                if (!table->contains(parts[k]))
-                    table->insert(parts[k], toml::table{});
+                if (!table->contains(parts[k])) table->insert(parts[k], toml::table{});
                 node = table->get(parts[k]);
                 // "rough" and "auto" give way to a table that is set key by key.
-                const Key* here = find_key(
-                    fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")));
+                const Key* here = find_key(fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")));
                 if (here && here->kind == Kind::ChoiceOrTable && !node->is_table()) {
                     table->insert_or_assign(parts[k], toml::table{});
                     node = table->get(parts[k]);
@@ -250,19 +212,14 @@ class Document
                 const auto i = as_index(parts[k]);
                 node = i ? array->get(*i) : nullptr;
                 if (!node)
-                    throw BadInput(fmt::format(
-                        "{}: expected a number from 0 to {} after {}, found {}; the file has {} of them",
-                        place, std::int64_t(array->size()) - 1, parts[k - 1], parts[k], array->size()));
-            } else
-                node = nullptr;
-            if (!node)
-                break;
+                    throw BadInput(fmt::format("{}: expected a number from 0 to {} after {}, found {}; the file has {} of them", place,
+                                               std::int64_t(array->size()) - 1, parts[k - 1], parts[k], array->size()));
+            } else node = nullptr;
+            if (!node) break;
         }
         auto* table = node ? node->as_table() : nullptr;
         if (!table)
-            throw BadInput(fmt::format(
-                "{}: expected a key inside a table, found {}, which is none; see the scene reference", place,
-                path));
+            throw BadInput(fmt::format("{}: expected a key inside a table, found {}, which is none; see the scene reference", place, path));
         table->insert_or_assign(parts.back(), *parsed.get("v"));
         sets_.emplace_back(path, set);
     }
@@ -297,10 +254,7 @@ std::string described(const toml::node& node)
     }
 }
 bool is_number(const toml::node* node) { return node && (node->is_integer() || node->is_floating_point()); }
-double number_of(const toml::node& node)
-{
-    return node.is_integer() ? double(node.as_integer()->get()) : node.as_floating_point()->get();
-}
+double number_of(const toml::node& node) { return node.is_integer() ? double(node.as_integer()->get()) : node.as_floating_point()->get(); }
 
 /// What was found instead of the value a key expects, and a remedy if there is a better one than an example.
 struct Mismatch {
@@ -309,46 +263,37 @@ struct Mismatch {
 
 std::optional<Mismatch> wrong_number(const Key& key, const toml::node& node)
 {
-    if (is_number(&node) && std::isfinite(number_of(node)) && key.range.holds(number_of(node)))
-        return {};
+    if (is_number(&node) && std::isfinite(number_of(node)) && key.range.holds(number_of(node))) return {};
     return Mismatch{described(node), {}};
 }
 std::optional<Mismatch> wrong_numbers(const Key& key, const toml::node& node, std::size_t count)
 {
     const auto* array = node.as_array();
-    if (!array || array->size() != count)
-        return Mismatch{described(node), {}};
+    if (!array || array->size() != count) return Mismatch{described(node), {}};
     for (const auto& x : *array)
         if (wrong_number(key, x)) {
             const bool outside = is_number(&x) && std::isfinite(number_of(x));
-            return Mismatch{described(x) + " among them" + (outside ? ", outside " + key.range.text() : ""),
-                            {}};
+            return Mismatch{described(x) + " among them" + (outside ? ", outside " + key.range.text() : ""), {}};
         }
     return {};
 }
 std::optional<Mismatch> wrong_choice(const Key& key, const toml::node& node)
 {
     const auto* s = node.as_string();
-    if (!s)
-        return Mismatch{described(node), {}};
-    if (std::find(key.choices.begin(), key.choices.end(), s->get()) != key.choices.end())
-        return {};
+    if (!s) return Mismatch{described(node), {}};
+    if (std::find(key.choices.begin(), key.choices.end(), s->get()) != key.choices.end()) return {};
     return Mismatch{described(node), fmt::format("did you mean \"{}\"?", nearest(s->get(), key.choices))};
 }
 std::optional<Mismatch> wrong_choices(const Key& key, const toml::node& node)
 {
     const auto* array = node.as_array();
-    if (!array)
-        return Mismatch{described(node), {}};
-    if (array->empty())
-        return Mismatch{"an empty one", "name at least one or leave the key out"};
+    if (!array) return Mismatch{described(node), {}};
+    if (array->empty()) return Mismatch{"an empty one", "name at least one or leave the key out"};
     std::vector<std::string> seen;
     for (const auto& element : *array) {
-        if (auto wrong = wrong_choice(key, element))
-            return wrong;
+        if (auto wrong = wrong_choice(key, element)) return wrong;
         const std::string& word = element.as_string()->get();
-        if (std::find(seen.begin(), seen.end(), word) != seen.end())
-            return Mismatch{described(element) + " twice", "name it once"};
+        if (std::find(seen.begin(), seen.end(), word) != seen.end()) return Mismatch{described(element) + " twice", "name it once"};
         seen.push_back(word);
     }
     return {};
@@ -356,9 +301,7 @@ std::optional<Mismatch> wrong_choices(const Key& key, const toml::node& node)
 
 std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
 {
-    const auto unless = [&](bool right) {
-        return right ? std::nullopt : std::optional(Mismatch{described(node), {}});
-    };
+    const auto unless = [&](bool right) { return right ? std::nullopt : std::optional(Mismatch{described(node), {}}); };
     switch (key.kind) {
     case Kind::Text:
         return unless(node.is_string());
@@ -371,11 +314,9 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     case Kind::Pair:
         return wrong_numbers(key, node, 2);
     case Kind::Points:
-        if (!node.is_array())
-            return unless(false);
+        if (!node.is_array()) return unless(false);
         for (const auto& point : *node.as_array())
-            if (auto wrong = wrong_numbers(key, point, 2))
-                return Mismatch{wrong->found + " as a corner", {}};
+            if (auto wrong = wrong_numbers(key, point, 2)) return Mismatch{wrong->found + " as a corner", {}};
         return {};
     case Kind::Choice:
         return wrong_choice(key, node);
@@ -388,22 +329,18 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     case Kind::Named:
         return unless(node.is_table() && !node.as_table()->empty());
     case Kind::Tables:
-        if (!node.is_array() || (node.as_array()->empty() && key.need == Need::Required))
-            return unless(false);
+        if (!node.is_array() || (node.as_array()->empty() && key.need == Need::Required)) return unless(false);
         for (const auto& element : *node.as_array())
-            if (!element.is_table())
-                return Mismatch{described(element) + " among them", {}};
+            if (!element.is_table()) return Mismatch{described(element) + " among them", {}};
         return {};
     }
     return {};
 }
 
-void complain_unknown(Document& file, const std::string& path, std::string_view leaf,
-                      std::string_view pattern)
+void complain_unknown(Document& file, const std::string& path, std::string_view leaf, std::string_view pattern)
 {
     std::vector<std::string> siblings;
-    for (const Key* k : keys_in(pattern))
-        siblings.emplace_back(k->leaf());
+    for (const Key* k : keys_in(pattern)) siblings.emplace_back(k->leaf());
     // Beyond what is shown, only the count matters.
     std::string meant = file.has_enough() ? siblings.front() : nearest(leaf, siblings);
     if (!file.has_enough() && edit_distance(meant, leaf.substr(0, 100)) > 0)
@@ -412,8 +349,8 @@ void complain_unknown(Document& file, const std::string& path, std::string_view 
                 meant = k.path;
                 break;
             }
-    file.complain(path, fmt::format("expected a known key, found \"{}\"; did you mean \"{}\"? Known here: {}",
-                                    leaf, meant, fmt::join(siblings, ", ")));
+    file.complain(path, fmt::format("expected a known key, found \"{}\"; did you mean \"{}\"? Known here: {}", leaf, meant,
+                                    fmt::join(siblings, ", ")));
 }
 
 /// Checks a table against the rows of its pattern and fills in defaults.
@@ -426,15 +363,12 @@ void check_table(Document& file, toml::table& table, const std::string& path)
 
     for (const Key* key : keys_in(pattern)) {
         const std::string here = join(path, key->leaf());
-        const std::string remedy =
-            key->kind == Kind::Tables || key->kind == Kind::Named
-                ? "write, for example, " + key->example
-                : fmt::format("write, for example, {} = {}", key->leaf(), key->example);
+        const std::string remedy = key->kind == Kind::Tables || key->kind == Kind::Named
+                                       ? "write, for example, " + key->example
+                                       : fmt::format("write, for example, {} = {}", key->leaf(), key->example);
         if (!table.contains(key->leaf())) {
-            if (key->need == Need::Required)
-                file.complain(here, fmt::format("expected {}, found nothing; {}", key->expected(), remedy));
-            if (key->need != Need::Default)
-                continue;
+            if (key->need == Need::Required) file.complain(here, fmt::format("expected {}, found nothing; {}", key->expected(), remedy));
+            if (key->need != Need::Default) continue;
             auto fallback = toml::parse("v = " + key->fallback);
             table.insert(key->leaf(), *fallback.get("v"));
         }
@@ -447,22 +381,16 @@ void check_table(Document& file, toml::table& table, const std::string& path)
         if (key->kind == Kind::Named) {
             for (auto&& [name, soil] : *node.as_table()) {
                 const std::string named = join(here, name.str());
-                const bool plain = name.str().find_first_not_of(
-                                       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
+                const bool plain = name.str().find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
                                    std::string_view::npos;
                 if (!plain || name.str().empty())
-                    file.complain(
-                        named, "expected a name of letters, digits, - and _, found another; rename the soil");
-                else if (auto* inside = soil.as_table())
-                    check_table(file, *inside, named);
-                else
-                    file.complain(
-                        named, fmt::format("expected a soil's table, found {}; {}", described(soil), remedy));
+                    file.complain(named, "expected a name of letters, digits, - and _, found another; rename the soil");
+                else if (auto* inside = soil.as_table()) check_table(file, *inside, named);
+                else file.complain(named, fmt::format("expected a soil's table, found {}; {}", described(soil), remedy));
             }
         } else if (key->kind == Kind::Tables) {
             std::size_t k = 0;
-            for (auto& element : *node.as_array())
-                check_table(file, *element.as_table(), join(here, std::to_string(k++)));
+            for (auto& element : *node.as_array()) check_table(file, *element.as_table(), join(here, std::to_string(k++)));
         } else if (auto* inside = node.as_table()) {
             check_table(file, *inside, here);
         }
@@ -470,16 +398,12 @@ void check_table(Document& file, toml::table& table, const std::string& path)
     if (pattern == "body.*" || pattern == "wall.*") {
         std::vector<std::string> shapes;
         for (const char* shape : {"box", "cylinder", "sphere", "polygon"})
-            if (table.contains(shape))
-                shapes.emplace_back(shape);
+            if (table.contains(shape)) shapes.emplace_back(shape);
         if (shapes.size() != 1)
-            file.complain(
-                path, fmt::format(
-                          "expected exactly one of box, cylinder, sphere, polygon, found {}; {}",
-                          shapes.empty() ? "none" : fmt::format("{}", fmt::join(shapes, " and ")),
-                          shapes.empty()
-                              ? "write, for example, box = { low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }"
-                              : "give every shape its own table"));
+            file.complain(path, fmt::format("expected exactly one of box, cylinder, sphere, polygon, found {}; {}",
+                                            shapes.empty() ? "none" : fmt::format("{}", fmt::join(shapes, " and ")),
+                                            shapes.empty() ? "write, for example, box = { low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }"
+                                                           : "give every shape its own table"));
     }
 }
 
@@ -549,11 +473,10 @@ template <class A> void describe(A& a, Scene& s)
         a.number("effects.viscosity.alpha", v.alpha);
         a.number("effects.viscosity.beta", v.beta);
     });
-    a.automatic("effects.artificial_stress", s.effects.artificial_stress,
-                s.effects.artificial_stress_decision, [&](auto& v) {
-                    a.number("effects.artificial_stress.epsilon", v.epsilon);
-                    a.number("effects.artificial_stress.exponent", v.exponent);
-                });
+    a.automatic("effects.artificial_stress", s.effects.artificial_stress, s.effects.artificial_stress_decision, [&](auto& v) {
+        a.number("effects.artificial_stress.epsilon", v.epsilon);
+        a.number("effects.artificial_stress.exponent", v.exponent);
+    });
     a.table("effects.damping", s.effects.damping, [&](auto& v) {
         a.number("effects.damping.ratio", v.ratio);
         a.number("effects.damping.until", v.until);
@@ -580,16 +503,14 @@ template <class A> void describe(A& a, Scene& s)
 }
 
 /// Fills a scene from a document that check_table() has approved.
-class Reader
-{
-  public:
+class Reader {
+public:
     explicit Reader(Document& file) : file_(file) {}
     void section(const char*) {}
     void text(const std::string& path, std::string& to) { to = node(path).as_string()->get(); }
     void optional_text(const std::string& path, std::string& to)
     {
-        if (file_.find(path))
-            text(path, to);
+        if (file_.find(path)) text(path, to);
     }
     void integer(const std::string& path, int& to) { to = int(node(path).as_integer()->get()); }
     void number(const std::string& path, double& to) { to = number_of(node(path)); }
@@ -609,84 +530,67 @@ class Reader
     }
     void pair(const std::string& path, std::array<double, 2>& to)
     {
-        if (const auto* n = file_.find(path))
-            to = {number_of(*n->as_array()->get(0)), number_of(*n->as_array()->get(1))};
+        if (const auto* n = file_.find(path)) to = {number_of(*n->as_array()->get(0)), number_of(*n->as_array()->get(1))};
     }
     void points(const std::string& path, std::vector<std::array<double, 2>>& to)
     {
-        for (const auto& p : *node(path).as_array())
-            to.push_back({number_of(*p.as_array()->get(0)), number_of(*p.as_array()->get(1))});
+        for (const auto& p : *node(path).as_array()) to.push_back({number_of(*p.as_array()->get(0)), number_of(*p.as_array()->get(1))});
     }
     void axes(const std::string& path, std::array<bool, 3>& to)
     {
         if (const auto* n = file_.find(path))
-            for (const auto& axis : *n->as_array())
-                to[std::size_t(axis.as_string()->get()[0] - 'x')] = true;
+            for (const auto& axis : *n->as_array()) to[std::size_t(axis.as_string()->get()[0] - 'x')] = true;
     }
     void words(const std::string& path, std::vector<std::string>& to)
     {
         to.clear();
-        for (const auto& word : *node(path).as_array())
-            to.push_back(word.as_string()->get());
+        for (const auto& word : *node(path).as_array()) to.push_back(word.as_string()->get());
     }
     template <class Enum> void choice(const std::string& path, Enum& to)
     {
         const auto& choices = find_key(path)->choices;
         to = Enum(std::find(choices.begin(), choices.end(), node(path).as_string()->get()) - choices.begin());
     }
-    template <class T, class Describe>
-    void table(const std::string& path, std::optional<T>& to, Describe describe)
+    template <class T, class Describe> void table(const std::string& path, std::optional<T>& to, Describe describe)
     {
         optionally(path, to, describe);
     }
     template <class T, class Describe>
-    void automatic(const std::string& path, std::optional<T>& to, scene::Decision& decision,
-                   Describe describe)
+    void automatic(const std::string& path, std::optional<T>& to, scene::Decision& decision, Describe describe)
     {
         const auto* n = file_.find(path);
-        if (n && n->is_string())
-            decision = scene::Decision::Auto;
-        else
-            optionally(path, to, describe);
+        if (n && n->is_string()) decision = scene::Decision::Auto;
+        else optionally(path, to, describe);
     }
-    template <class T, class Describe>
-    void tables(const std::string& path, std::vector<T>& to, Describe describe)
+    template <class T, class Describe> void tables(const std::string& path, std::vector<T>& to, Describe describe)
     {
         const auto* array = file_.find(path);
         to.resize(array ? array->as_array()->size() : 0);
-        for (std::size_t k = 0; k < to.size(); ++k)
-            describe(fmt::format("{}.{}", path, k), to[k]);
+        for (std::size_t k = 0; k < to.size(); ++k) describe(fmt::format("{}.{}", path, k), to[k]);
     }
     template <class Describe> void soils(std::vector<scene::Soil>& to, Describe describe)
     {
-        for (const auto& [name, soil] : *node("soil").as_table())
-            to.emplace_back().name = std::string(name.str());
+        for (const auto& [name, soil] : *node("soil").as_table()) to.emplace_back().name = std::string(name.str());
         // The file's order, which the library's tables do not keep.
         std::stable_sort(to.begin(), to.end(), [&](const auto& a, const auto& b) {
             const auto position = [&](const auto& soil) {
                 const auto source = node("soil." + soil.name).source().begin;
-                return source.line ? std::pair(source.line, source.column)
-                                   : std::pair(~decltype(source.line)(0), source.column);
+                return source.line ? std::pair(source.line, source.column) : std::pair(~decltype(source.line)(0), source.column);
             };
             return position(a) < position(b);
         });
-        for (auto& soil : to)
-            describe("soil." + soil.name, soil);
+        for (auto& soil : to) describe("soil." + soil.name, soil);
     }
     void soil_of(const std::string& path, int& to, const std::vector<scene::Soil>& soils)
     {
         const std::string& name = node(path).as_string()->get();
         std::vector<std::string> names;
-        for (const auto& soil : soils)
-            names.push_back(soil.name);
+        for (const auto& soil : soils) names.push_back(soil.name);
         const auto found = std::find(names.begin(), names.end(), name);
         to = found == names.end() ? 0 : int(found - names.begin());
         if (found == names.end())
-            file_.complain(
-                path,
-                fmt::format(
-                    "expected the name of a soil, found \"{}\"; did you mean \"{}\"? Or write [soil.{}]",
-                    name, nearest(name, names), name));
+            file_.complain(path, fmt::format("expected the name of a soil, found \"{}\"; did you mean \"{}\"? Or write [soil.{}]", name,
+                                             nearest(name, names), name));
     }
     void surface(const std::string& path, scene::Wall& wall)
     {
@@ -697,25 +601,21 @@ class Reader
             choice(path, wall.surface);
         }
     }
-    template <class T, class Describe>
-    void alternative(const std::string& path, scene::Shape& shape, Describe describe)
+    template <class T, class Describe> void alternative(const std::string& path, scene::Shape& shape, Describe describe)
     {
-        if (file_.find(path))
-            describe(path, shape.emplace<T>());
+        if (file_.find(path)) describe(path, shape.emplace<T>());
     }
 
-  private:
+private:
     const toml::node& node(const std::string& path) const
     {
         const auto* found = file_.find(path);
         ensure(found, "a key is read that was not checked");
         return *found;
     }
-    template <class T, class Describe>
-    void optionally(const std::string& path, std::optional<T>& to, Describe describe)
+    template <class T, class Describe> void optionally(const std::string& path, std::optional<T>& to, Describe describe)
     {
-        if (file_.find(path))
-            describe(to.emplace());
+        if (file_.find(path)) describe(to.emplace());
     }
     Document& file_;
 };
@@ -724,8 +624,7 @@ class Reader
 std::string toml_number(double x)
 {
     auto text = fmt::format("{}", x);
-    if (text.find_first_of(".en") == text.npos)
-        text += ".0";
+    if (text.find_first_of(".en") == text.npos) text += ".0";
     return text;
 }
 /// An angle in degrees that reads back to the same radians, in the fewest digits.
@@ -738,11 +637,9 @@ std::string toml_degrees(double radians)
     for (int k = 0; k < 4; ++k) {
         up = std::nextafter(up, 360.0), down = std::nextafter(down, -360.0);
         for (const double d : {up, down}) {
-            if (d * radians_per_degree != radians)
-                continue;
+            if (d * radians_per_degree != radians) continue;
             auto text = toml_number(d);
-            if (!exact || text.size() < best.size())
-                best = std::move(text);
+            if (!exact || text.size() < best.size()) best = std::move(text);
             exact = true;
         }
     }
@@ -752,12 +649,9 @@ std::string toml_string(std::string_view s)
 {
     std::string out = "\"";
     for (const char c : s) {
-        if (c == '"' || c == '\\')
-            out += '\\', out += c;
-        else if ((unsigned char)(c) < 0x20 || c == 0x7F)
-            out += fmt::format("\\u{:04X}", int(c));
-        else
-            out += c;
+        if (c == '"' || c == '\\') out += '\\', out += c;
+        else if ((unsigned char)(c) < 0x20 || c == 0x7F) out += fmt::format("\\u{:04X}", int(c));
+        else out += c;
     }
     return out + '"';
 }
@@ -767,54 +661,38 @@ enum class Purpose { File, Hash };
 
 /// Writes a scene as TOML. For a hash: whole paths, soils by number, decisions instead of "auto", no
 /// bookkeeping.
-class Writer
-{
-  public:
+class Writer {
+public:
     explicit Writer(Purpose purpose) : purpose_(purpose) {}
     std::string out;
 
     void section(const std::string& path) { header("[" + path + "]"); }
     void text(const std::string& path, const std::string& s) { emit(path, toml_string(s)); }
-    void optional_text(const std::string& path, const std::string& s)
-    {
-        s.empty() ? absent(path) : text(path, s);
-    }
+    void optional_text(const std::string& path, const std::string& s) { s.empty() ? absent(path) : text(path, s); }
     void integer(const std::string& path, int n) { emit(path, std::to_string(n)); }
     void number(const std::string& path, double x) { emit(path, digits(x)); }
-    void number(const std::string& path, const std::optional<double>& x)
-    {
-        x ? number(path, *x) : absent(path);
-    }
-    void angle(const std::string& path, double x)
-    {
-        emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x));
-    }
+    void number(const std::string& path, const std::optional<double>& x) { x ? number(path, *x) : absent(path); }
+    void angle(const std::string& path, double x) { emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x)); }
     void vector(const std::string& path, const Vector& v)
     {
         emit(path, fmt::format("[{}, {}, {}]", digits(v.x), digits(v.y), digits(v.z)));
     }
-    void vector(const std::string& path, const std::optional<Vector>& v)
-    {
-        v ? vector(path, *v) : absent(path);
-    }
+    void vector(const std::string& path, const std::optional<Vector>& v) { v ? vector(path, *v) : absent(path); }
     void pair(const std::string& path, const std::array<double, 2>& p)
     {
-        if (p[0] != 0 || p[1] != 0)
-            emit(path, fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
+        if (p[0] != 0 || p[1] != 0) emit(path, fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
     }
     void points(const std::string& path, const std::vector<std::array<double, 2>>& ps)
     {
         std::vector<std::string> texts;
-        for (const auto& p : ps)
-            texts.push_back(fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
+        for (const auto& p : ps) texts.push_back(fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
         emit(path, fmt::format("[{}]", fmt::join(texts, ", ")));
     }
     void axes(const std::string& path, const std::array<bool, 3>& on)
     {
         std::vector<std::string> names;
         for (int k = 0; k < 3; ++k)
-            if (on[std::size_t(k)])
-                names.emplace_back(1, "xyz"[k]);
+            if (on[std::size_t(k)]) names.emplace_back(1, "xyz"[k]);
         names.empty() ? absent(path) : words(path, names);
     }
     void words(const std::string& path, const std::vector<std::string>& words)
@@ -825,25 +703,18 @@ class Writer
     {
         emit(path, toml_string(find_key(path)->choices.at(std::size_t(value))));
     }
-    template <class T, class Describe>
-    void table(const std::string& path, std::optional<T>& value, Describe describe)
+    template <class T, class Describe> void table(const std::string& path, std::optional<T>& value, Describe describe)
     {
-        if (value)
-            inlined(path, [&] { describe(*value); });
-        else
-            absent(path);
+        if (value) inlined(path, [&] { describe(*value); });
+        else absent(path);
     }
     template <class T, class Describe>
-    void automatic(const std::string& path, std::optional<T>& value, scene::Decision decision,
-                   Describe describe)
+    void automatic(const std::string& path, std::optional<T>& value, scene::Decision decision, Describe describe)
     {
-        if (decision == scene::Decision::Auto && purpose_ == Purpose::File)
-            emit(path, "\"auto\"");
-        else
-            table(path, value, describe);
+        if (decision == scene::Decision::Auto && purpose_ == Purpose::File) emit(path, "\"auto\"");
+        else table(path, value, describe);
     }
-    template <class T, class Describe>
-    void tables(const std::string& path, std::vector<T>& elements, Describe describe)
+    template <class T, class Describe> void tables(const std::string& path, std::vector<T>& elements, Describe describe)
     {
         for (std::size_t k = 0; k < elements.size(); ++k) {
             header("[[" + path + "]]");
@@ -859,29 +730,23 @@ class Writer
     }
     void soil_of(const std::string& path, int soil, const std::vector<scene::Soil>& soils)
     {
-        emit(path, purpose_ == Purpose::Hash ? std::to_string(soil)
-                                             : toml_string(soils.at(std::size_t(soil)).name));
+        emit(path, purpose_ == Purpose::Hash ? std::to_string(soil) : toml_string(soils.at(std::size_t(soil)).name));
     }
     void surface(const std::string& path, const scene::Wall& wall)
     {
-        if (wall.surface == scene::Surface::Coulomb)
-            inlined(path, [&] { angle(path + ".friction_angle", wall.friction_angle); });
-        else
-            choice(path, wall.surface);
+        if (wall.surface == scene::Surface::Coulomb) inlined(path, [&] { angle(path + ".friction_angle", wall.friction_angle); });
+        else choice(path, wall.surface);
     }
-    template <class T, class Describe>
-    void alternative(const std::string& path, scene::Shape& shape, Describe describe)
+    template <class T, class Describe> void alternative(const std::string& path, scene::Shape& shape, Describe describe)
     {
-        if (auto* s = std::get_if<T>(&shape))
-            inlined(path, [&] { describe(path, *s); });
+        if (auto* s = std::get_if<T>(&shape)) inlined(path, [&] { describe(path, *s); });
     }
 
-  private:
+private:
     std::string digits(double x) const { return toml_number(purpose_ == Purpose::Hash ? x + 0.0 : x); }
     void header(const std::string& text)
     {
-        if (purpose_ == Purpose::File)
-            out += "\n" + text + "\n";
+        if (purpose_ == Purpose::File) out += "\n" + text + "\n";
     }
     void emit(const std::string& path, const std::string& value)
     {
@@ -889,19 +754,16 @@ class Writer
         if (inline_) {
             *inline_ += fmt::format("{}{} = {}", inline_->empty() ? "" : ", ", key.leaf(), value);
         } else if (purpose_ == Purpose::Hash) {
-            if (key.role == Role::Physics)
-                out += fmt::format("{} = {}\n", path, value);
+            if (key.role == Role::Physics) out += fmt::format("{} = {}\n", path, value);
         } else {
             const auto line = fmt::format("{} = {}", key.leaf(), value);
-            out += key.unit.empty() || key.unit == "1" ? line + "\n"
-                                                       : fmt::format("{:<40} # {}\n", line, key.unit);
+            out += key.unit.empty() || key.unit == "1" ? line + "\n" : fmt::format("{:<40} # {}\n", line, key.unit);
         }
     }
     /// What is not there is named, so that a written scene shows all it could say.
     void absent(const std::string& path)
     {
-        if (inline_ || purpose_ == Purpose::Hash)
-            return;
+        if (inline_ || purpose_ == Purpose::Hash) return;
         const Key& key = *find_key(path);
         out += fmt::format("# no {}: {}\n", key.leaf(), key.doc);
     }
@@ -930,28 +792,22 @@ std::string written(const Scene& scene, Purpose purpose)
 std::string read_scene_text(const std::filesystem::path& path)
 {
     const auto refuse = [&](const std::string& found) {
-        throw BadInput(fmt::format("{}: expected a scene file, found {}; give the path of a .toml file",
-                                   path.string(), found));
+        throw BadInput(fmt::format("{}: expected a scene file, found {}; give the path of a .toml file", path.string(), found));
     };
     std::error_code error;
-    if (std::filesystem::is_directory(path, error))
-        refuse("a directory");
+    if (std::filesystem::is_directory(path, error)) refuse("a directory");
     errno = 0;
     std::ifstream in(path, std::ios::binary);
-    if (!in)
-        refuse(errno ? std::strerror(errno) : "a file that cannot be opened");
+    if (!in) refuse(errno ? std::strerror(errno) : "a file that cannot be opened");
     std::string text(largest_file + 1, '\0');
     in.read(text.data(), std::streamsize(text.size()));
-    if (in.bad())
-        refuse("a file that cannot be read");
+    if (in.bad()) refuse("a file that cannot be read");
     text.resize(std::size_t(in.gcount()));
-    if (text.size() > largest_file)
-        refuse("more than 1 MiB");
+    if (text.size() > largest_file) refuse("more than 1 MiB");
     return text;
 }
 
-Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets,
-                  scene::StepLimit limit)
+Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
 {
     Document file(text, name, sets);
     check_table(file, file.root, "");
@@ -965,9 +821,9 @@ Scene parse_scene(std::string_view text, const std::string& name, std::span<cons
     scene::resolve(scene);
     for (const auto& issue : scene::check(scene, limit))
         if (issue.severity == scene::Severity::Error)
-            file.complain(issue.key, issue.other.empty() ? issue.text
-                                                         : fmt::format("{} ({} is at {})", issue.text,
-                                                                       issue.other, file.place(issue.other)));
+            file.complain(issue.key, issue.other.empty()
+                                         ? issue.text
+                                         : fmt::format("{} ({} is at {})", issue.text, issue.other, file.place(issue.other)));
     file.throw_if_any();
     return scene;
 }
@@ -983,8 +839,7 @@ std::string scene_hash(const Scene& scene)
 {
     // FNV-1a, 64 bits.
     std::uint64_t hash = 14695981039346656037ull;
-    for (const char c : written(scene, Purpose::Hash))
-        hash = (hash ^ (unsigned char)(c)) * 1099511628211ull;
+    for (const char c : written(scene, Purpose::Hash)) hash = (hash ^ (unsigned char)(c)) * 1099511628211ull;
     return fmt::format("{:016x}", hash);
 }
 
@@ -996,13 +851,11 @@ std::string scene_reference()
                       "Presence is the switch: what is not written is not simulated.\n";
     std::string section = "none";
     for (const Key& key : scene_keys()) {
-        const bool group = key.kind == Kind::Named || key.kind == Kind::Tables ||
-                           (key.kind == Kind::Table && key.path.find('.') == key.path.npos);
-        const std::string head =
-            key.path.find('.') == key.path.npos ? "" : key.path.substr(0, key.path.find('.'));
+        const bool group =
+            key.kind == Kind::Named || key.kind == Kind::Tables || (key.kind == Kind::Table && key.path.find('.') == key.path.npos);
+        const std::string head = key.path.find('.') == key.path.npos ? "" : key.path.substr(0, key.path.find('.'));
         const std::string here = group ? key.path : head;
-        if (key.path == "soil.*")
-            continue;
+        if (key.path == "soil.*") continue;
         if (here != section) {
             section = here;
             const Key* parent = here.empty() ? nullptr : find_key(here);
@@ -1011,31 +864,21 @@ std::string scene_reference()
                                       : parent->kind == Kind::Named  ? fmt::format("`[{}.<name>]`", here)
                                                                      : fmt::format("`[{}]`", here);
             out += fmt::format("\n## {}\n\n", title);
-            if (parent)
-                out +=
-                    fmt::format("{}{}.\n\n", parent->doc, parent->need == Need::Required ? "; needed" : "");
+            if (parent) out += fmt::format("{}{}.\n\n", parent->doc, parent->need == Need::Required ? "; needed" : "");
             out += "| key | value | unit | default | range | meaning |\n|---|---|---|---|---|---|\n";
         }
-        if (group)
-            continue;
+        if (group) continue;
         std::string name = key.path.substr(here.empty() ? 0 : here.size() + 1);
-        if (name.starts_with("*."))
-            name.erase(0, 2);
-        const std::string shown = key.need == Need::Required   ? "needed"
-                                  : key.need == Need::Optional ? "none"
-                                                               : "`" + key.fallback + "`";
-        const char* names[] = {"string", "number", "integer", "[x, y, z]", "[from, to]", "[[x, z], ...]",
-                               "",       "",       "",        "table",     "",           ""};
+        if (name.starts_with("*.")) name.erase(0, 2);
+        const std::string shown = key.need == Need::Required ? "needed" : key.need == Need::Optional ? "none" : "`" + key.fallback + "`";
+        const char* names[] = {"string", "number", "integer", "[x, y, z]", "[from, to]", "[[x, z], ...]", "", "", "", "table", "", ""};
         std::string value = names[int(key.kind)];
         if (!key.choices.empty()) {
             value = fmt::format("`\"{}\"`", fmt::join(key.choices, "\"`, `\""));
-            if (key.kind == Kind::Choices)
-                value = "array of " + value;
-            if (key.kind == Kind::ChoiceOrTable)
-                value += " or table";
+            if (key.kind == Kind::Choices) value = "array of " + value;
+            if (key.kind == Kind::ChoiceOrTable) value += " or table";
         }
-        out += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, value, key.unit, shown,
-                           key.range.text(), key.doc);
+        out += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, value, key.unit, shown, key.range.text(), key.doc);
     }
     return out;
 }

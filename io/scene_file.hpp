@@ -7,8 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// The file's bytes. Throws BadInput if it cannot be read or is larger than 1 MiB.
 std::string read_scene_text(const std::filesystem::path&);
@@ -20,8 +19,7 @@ Scene parse_scene(std::string_view text, const std::string& name, std::span<cons
                   scene::StepLimit = scene::StepLimit::Enforce);
 
 /// parse_scene of read_scene_text. Throws BadInput.
-Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {},
-                 scene::StepLimit = scene::StepLimit::Enforce);
+Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {}, scene::StepLimit = scene::StepLimit::Enforce);
 
 /// The scene as TOML with every default written out; it reads back to the same scene bit for bit.
 std::string write_scene(const Scene&);

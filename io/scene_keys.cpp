@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 Range above(double low) { return {.low = low, .low_open = true}; }
 Range from(double low) { return {.low = low}; }
@@ -25,107 +23,27 @@ std::vector<Key> make_keys()
     const auto book = Role::Bookkeeping;
     std::vector<Key> keys{
         {"title", Text, "", Required, "", any, {}, "\"self-weight collapse\"", "what this scene is", book},
-        {"dimensions",
-         Integer,
-         "",
-         Required,
-         "",
-         between(2, 3),
-         {},
-         "3",
-         "3, or 2: plane strain in x-z with a full 3-D stress tensor"},
+        {"dimensions", Integer, "", Required, "", between(2, 3), {}, "3", "3, or 2: plane strain in x-z with a full 3-D stress tensor"},
 
         {"space", Table, "", Required, "", any, {}, "{ spacing = 0.04 }", "resolution and extent"},
-        {"space.spacing",
-         Number,
-         "m",
-         Required,
-         "",
-         between(1e-6, 1e6),
-         {},
-         "0.04",
-         "initial distance of particles"},
-        {"space.h",
-         Number,
-         "spacings",
-         Default,
-         "1.3",
-         between(0.8, 3),
-         {},
-         "1.3",
-         "smoothing length; the support is 2 h"},
-        {"space.low",
-         Vector,
-         "m",
-         Optional,
-         "",
-         place,
-         {},
-         "[-1.0, -1.0, -0.5]",
-         "lower corner of the box that particles may not leave"},
-        {"space.high",
-         Vector,
-         "m",
-         Optional,
-         "",
-         place,
-         {},
-         "[10.0, 10.0, 5.0]",
-         "upper corner of the box that particles may not leave"},
-        {"space.periodic",
-         Choices,
-         "",
-         Optional,
-         "",
-         any,
-         {"x", "y", "z"},
-         "[\"y\"]",
-         "axes along which space repeats from low to high"},
+        {"space.spacing", Number, "m", Required, "", between(1e-6, 1e6), {}, "0.04", "initial distance of particles"},
+        {"space.h", Number, "spacings", Default, "1.3", between(0.8, 3), {}, "1.3", "smoothing length; the support is 2 h"},
+        {"space.low", Vector, "m", Optional, "", place, {}, "[-1.0, -1.0, -0.5]", "lower corner of the box that particles may not leave"},
+        {"space.high", Vector, "m", Optional, "", place, {}, "[10.0, 10.0, 5.0]", "upper corner of the box that particles may not leave"},
+        {"space.periodic", Choices, "", Optional, "", any, {"x", "y", "z"}, "[\"y\"]", "axes along which space repeats from low to high"},
 
         {"time", Table, "", Required, "", any, {}, "{ end = 1.0 }", "how long, in which steps"},
         {"time.end", Number, "s", Required, "", above(0), {}, "1.0", "time at which the run ends", book},
-        {"time.step",
-         Number,
-         "s",
-         Optional,
-         "",
-         above(0),
-         {},
-         "1.0e-4",
-         "fixed step; without it the step follows accuracy.cfl"},
+        {"time.step", Number, "s", Optional, "", above(0), {}, "1.0e-4", "fixed step; without it the step follows accuracy.cfl"},
 
         {"soil", Named, "", Required, "", any, {}, "[soil.sand]", "any number of soils, each with a name"},
         {"soil.*", Table, "", Optional, "", any, {}, "[soil.sand]", "one soil"},
-        {"soil.*.density",
-         Number,
-         "kg/m^3",
-         Required,
-         "",
-         above(0),
-         {},
-         "1850.0",
-         "bulk density at the start"},
+        {"soil.*.density", Number, "kg/m^3", Required, "", above(0), {}, "1850.0", "bulk density at the start"},
         {"soil.*.young", Number, "Pa", Required, "", above(0), {}, "1.8e6", "Young's modulus"},
         {"soil.*.poisson", Number, "1", Required, "", from_below(0, 0.5), {}, "0.3", "Poisson's ratio"},
         {"soil.*.cohesion", Number, "Pa", Default, "0.0", from(0), {}, "5000.0", "cohesion c"},
-        {"soil.*.friction_angle",
-         Number,
-         "deg",
-         Default,
-         "0.0",
-         from_below(0, 90),
-         {},
-         "25.0",
-         "friction angle phi"},
-        {"soil.*.dilation_angle",
-         Number,
-         "deg",
-         Default,
-         "0.0",
-         from_below(0, 90),
-         {},
-         "0.0",
-         "dilation angle psi, at most phi"},
+        {"soil.*.friction_angle", Number, "deg", Default, "0.0", from_below(0, 90), {}, "25.0", "friction angle phi"},
+        {"soil.*.dilation_angle", Number, "deg", Default, "0.0", from_below(0, 90), {}, "0.0", "dilation angle psi, at most phi"},
         {"soil.*.cone",
          Choice,
          "",
@@ -145,25 +63,9 @@ std::vector<Key> make_keys()
          "1000.0",
          "largest mean tension, at most the cone's apex c cot(phi)"},
 
-        {"body",
-         Tables,
-         "",
-         Required,
-         "",
-         any,
-         {},
-         "[[body]]",
-         "soil of one shape; bodies may touch, not overlap"},
+        {"body", Tables, "", Required, "", any, {}, "[[body]]", "soil of one shape; bodies may touch, not overlap"},
         {"body.*.soil", Text, "", Required, "", any, {}, "\"sand\"", "name of the soil it is made of"},
-        {"body.*.velocity",
-         Vector,
-         "m/s",
-         Default,
-         "[0.0, 0.0, 0.0]",
-         between(-1e6, 1e6),
-         {},
-         "[0.0, 0.0, -1.0]",
-         "velocity at the start"},
+        {"body.*.velocity", Vector, "m/s", Default, "[0.0, 0.0, 0.0]", between(-1e6, 1e6), {}, "[0.0, 0.0, -1.0]", "velocity at the start"},
         {"body.*.stress",
          Choice,
          "",
@@ -184,15 +86,7 @@ std::vector<Key> make_keys()
          {"rough", "smooth"},
          "\"rough\"",
          "\"rough\" (no slip), \"smooth\" (free slip) or { friction_angle } (Coulomb)"},
-        {"wall.*.surface.friction_angle",
-         Number,
-         "deg",
-         Required,
-         "",
-         from_below(0, 90),
-         {},
-         "20.0",
-         "Coulomb friction of the wall"},
+        {"wall.*.surface.friction_angle", Number, "deg", Required, "", from_below(0, 90), {}, "20.0", "Coulomb friction of the wall"},
 
         {"effects",
          Table,
@@ -203,15 +97,7 @@ std::vector<Key> make_keys()
          {},
          "{ gravity = [0.0, 0.0, -9.81] }",
          "what is simulated beyond the soil itself: only what is written"},
-        {"effects.gravity",
-         Vector,
-         "m/s^2",
-         Optional,
-         "",
-         between(-1e6, 1e6),
-         {},
-         "[0.0, 0.0, -9.81]",
-         "body force per mass"},
+        {"effects.gravity", Vector, "m/s^2", Optional, "", between(-1e6, 1e6), {}, "[0.0, 0.0, -9.81]", "body force per mass"},
         {"effects.viscosity",
          Table,
          "",
@@ -241,15 +127,7 @@ std::vector<Key> make_keys()
          {},
          "0.5",
          "share of the tensile principal stress"},
-        {"effects.artificial_stress.exponent",
-         Number,
-         "1",
-         Default,
-         "2.55",
-         above_to(0, 20),
-         {},
-         "2.55",
-         "exponent n of W(r)/W(spacing)"},
+        {"effects.artificial_stress.exponent", Number, "1", Default, "2.55", above_to(0, 20), {}, "2.55", "exponent n of W(r)/W(spacing)"},
         {"effects.damping",
          Table,
          "",
@@ -259,34 +137,10 @@ std::vector<Key> make_keys()
          {},
          "{ ratio = 0.02, until = 0.5 }",
          "viscous damping to settle an initial state"},
-        {"effects.damping.ratio",
-         Number,
-         "of critical",
-         Required,
-         "",
-         above_to(0, 10),
-         {},
-         "0.02",
-         "strength"},
-        {"effects.damping.until",
-         Number,
-         "s",
-         Required,
-         "",
-         above(0),
-         {},
-         "0.5",
-         "time at which it is switched off"},
+        {"effects.damping.ratio", Number, "of critical", Required, "", above_to(0, 10), {}, "0.02", "strength"},
+        {"effects.damping.until", Number, "s", Required, "", above(0), {}, "0.5", "time at which it is switched off"},
 
-        {"accuracy",
-         Table,
-         "",
-         Default,
-         "{}",
-         any,
-         {},
-         "{ cfl = 0.2 }",
-         "everything that trades error for time"},
+        {"accuracy", Table, "", Default, "{}", any, {}, "{ cfl = 0.2 }", "everything that trades error for time"},
         {"accuracy.kernel",
          Choice,
          "",
@@ -296,15 +150,7 @@ std::vector<Key> make_keys()
          {"cubic spline", "wendland c2", "wendland c4"},
          "\"cubic spline\"",
          "smoothing kernel"},
-        {"accuracy.cfl",
-         Number,
-         "1",
-         Default,
-         "0.2",
-         above(0),
-         {},
-         "0.2",
-         "Courant number of the step where time.step is absent"},
+        {"accuracy.cfl", Number, "1", Default, "0.2", above(0), {}, "0.2", "Courant number of the step where time.step is absent"},
         {"accuracy.precision",
          Choice,
          "",
@@ -314,15 +160,7 @@ std::vector<Key> make_keys()
          {"double", "mixed"},
          "\"double\"",
          "\"mixed\": pair sums in single, state in double precision"},
-        {"accuracy.correction",
-         Choice,
-         "",
-         Default,
-         "\"none\"",
-         any,
-         {"none"},
-         "\"none\"",
-         "correction of kernel gradients"},
+        {"accuracy.correction", Choice, "", Default, "\"none\"", any, {"none"}, "\"none\"", "correction of kernel gradients"},
         {"accuracy.skin",
          Number,
          "supports",
@@ -333,16 +171,7 @@ std::vector<Key> make_keys()
          "0.1",
          "reach of neighbour lists beyond the support: cost only"},
 
-        {"output",
-         Table,
-         "",
-         Default,
-         "{}",
-         any,
-         {},
-         "{ every = 0.05 }",
-         "what a run leaves in its directory",
-         book},
+        {"output", Table, "", Default, "{}", any, {}, "{ every = 0.05 }", "what a run leaves in its directory", book},
         {"output.directory",
          Text,
          "",
@@ -393,16 +222,7 @@ std::vector<Key> make_keys()
          "0.04",
          "height from which a column counts as soil in history.csv; without it one spacing",
          book},
-        {"output.checkpoint_minutes",
-         Number,
-         "min",
-         Default,
-         "30.0",
-         above(0),
-         {},
-         "30.0",
-         "wall time between checkpoints",
-         book},
+        {"output.checkpoint_minutes", Number, "min", Default, "30.0", above(0), {}, "30.0", "wall time between checkpoints", book},
         {"output.picture",
          Table,
          "",
@@ -413,16 +233,7 @@ std::vector<Key> make_keys()
          R"({ view = "oblique", color = "displacement" })",
          "pictures of the snapshots",
          book},
-        {"output.picture.view",
-         Choice,
-         "",
-         Default,
-         "\"oblique\"",
-         any,
-         {"oblique", "side", "top"},
-         "\"oblique\"",
-         "where from",
-         book},
+        {"output.picture.view", Choice, "", Default, "\"oblique\"", any, {"oblique", "side", "top"}, "\"oblique\"", "where from", book},
         {"output.picture.color",
          Choice,
          "",
@@ -435,15 +246,7 @@ std::vector<Key> make_keys()
          book},
     };
     const std::vector<Key> shapes{
-        {"box",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }",
-         "a box of whole spacings a side"},
+        {"box", Table, "", Optional, "", any, {}, "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }", "a box of whole spacings a side"},
         {"box.low", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "lower corner"},
         {"box.high", Vector, "m", Required, "", place, {}, "[1.0, 1.0, 1.0]", "upper corner"},
         {"cylinder",
@@ -455,26 +258,10 @@ std::vector<Key> make_keys()
          {},
          "{ base = [0.0, 0.0, 0.0], radius = 0.1, height = 0.2 }",
          "an upright cylinder (3-D)"},
-        {"cylinder.base",
-         Vector,
-         "m",
-         Required,
-         "",
-         place,
-         {},
-         "[0.0, 0.0, 0.0]",
-         "centre of its lower face"},
+        {"cylinder.base", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "centre of its lower face"},
         {"cylinder.radius", Number, "m", Required, "", size, {}, "0.1", "radius"},
         {"cylinder.height", Number, "m", Required, "", size, {}, "0.2", "height along z"},
-        {"sphere",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ center = [0.0, 0.0, 0.0], radius = 0.1 }",
-         "a sphere, in 2-D a disc"},
+        {"sphere", Table, "", Optional, "", any, {}, "{ center = [0.0, 0.0, 0.0], radius = 0.1 }", "a sphere, in 2-D a disc"},
         {"sphere.center", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "centre"},
         {"sphere.radius", Number, "m", Required, "", size, {}, "0.1", "radius"},
         {"polygon",
@@ -486,31 +273,13 @@ std::vector<Key> make_keys()
          {},
          "{ points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], y = [0.0, 1.0] }",
          "a polygon in x-z, drawn out along y"},
-        {"polygon.points",
-         Points,
-         "m",
-         Required,
-         "",
-         place,
-         {},
-         "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]",
-         "its corners [x, z] in order"},
-        {"polygon.y",
-         Pair,
-         "m",
-         Optional,
-         "",
-         place,
-         {},
-         "[0.0, 1.0]",
-         "its extent along y; needed in 3-D, left out in 2-D"},
+        {"polygon.points", Points, "m", Required, "", place, {}, "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]", "its corners [x, z] in order"},
+        {"polygon.y", Pair, "m", Optional, "", place, {}, "[0.0, 1.0]", "its extent along y; needed in 3-D, left out in 2-D"},
     };
     for (const char* parent : {"body.*.", "wall.*."}) {
-        const auto at =
-            std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path.starts_with(parent); });
+        const auto at = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path.starts_with(parent); });
         auto rows = shapes;
-        for (auto& row : rows)
-            row.path = parent + row.path;
+        for (auto& row : rows) row.path = parent + row.path;
         keys.insert(at, rows.begin(), rows.end());
     }
     return keys;
@@ -518,19 +287,13 @@ std::vector<Key> make_keys()
 
 } // namespace
 
-bool Range::holds(double x) const
-{
-    return (low_open ? x > low : x >= low) && (high_open ? x < high : x <= high);
-}
+bool Range::holds(double x) const { return (low_open ? x > low : x >= low) && (high_open ? x < high : x <= high); }
 
 std::string Range::text() const
 {
-    const bool below = low > -std::numeric_limits<double>::infinity(),
-               above = high < std::numeric_limits<double>::infinity();
-    if (below && above)
-        return fmt::format("{:g} {} x {} {:g}", low, low_open ? "<" : "<=", high_open ? "<" : "<=", high);
-    if (below)
-        return fmt::format("x {} {:g}", low_open ? ">" : ">=", low);
+    const bool below = low > -std::numeric_limits<double>::infinity(), above = high < std::numeric_limits<double>::infinity();
+    if (below && above) return fmt::format("{:g} {} x {} {:g}", low, low_open ? "<" : "<=", high_open ? "<" : "<=", high);
+    if (below) return fmt::format("x {} {:g}", low_open ? ">" : ">=", low);
     return above ? fmt::format("x {} {:g}", high_open ? "<" : "<=", high) : "";
 }
 
@@ -578,8 +341,7 @@ std::string pattern_of(std::string_view path)
 {
     const auto first = path.find('.');
     const auto head = path.substr(0, first);
-    if (first == path.npos || (head != "soil" && head != "body" && head != "wall"))
-        return std::string(path);
+    if (first == path.npos || (head != "soil" && head != "body" && head != "wall")) return std::string(path);
     const auto second = path.find('.', first + 1);
     return std::string(head) + ".*" + std::string(second == path.npos ? "" : path.substr(second));
 }
@@ -588,8 +350,7 @@ const Key* find_key(std::string_view path)
 {
     const std::string pattern = pattern_of(path);
     const auto& keys = scene_keys();
-    const auto found =
-        std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path == pattern; });
+    const auto found = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path == pattern; });
     return found == keys.end() ? nullptr : &*found;
 }
 
@@ -598,8 +359,7 @@ std::vector<const Key*> keys_in(std::string_view pattern)
     const std::string head = pattern.empty() ? "" : std::string(pattern) + ".";
     std::vector<const Key*> inside;
     for (const Key& k : scene_keys())
-        if (k.path.starts_with(head) && k.path.find('.', head.size()) == k.path.npos && k.leaf() != "*")
-            inside.push_back(&k);
+        if (k.path.starts_with(head) && k.path.find('.', head.size()) == k.path.npos && k.leaf() != "*") inside.push_back(&k);
     return inside;
 }
 
@@ -613,8 +373,7 @@ int edit_distance(std::string_view a, std::string_view b)
                 continue;
             }
             d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-                d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
         }
     return d[a.size()][b.size()];
 }
@@ -623,9 +382,8 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
 {
     // A very long word is near to nothing, and the table of distances would be large.
     const auto word = written.substr(0, 100);
-    const auto best = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-        return edit_distance(word, a) < edit_distance(word, b);
-    });
+    const auto best = std::min_element(known.begin(), known.end(),
+                                       [&](const auto& a, const auto& b) { return edit_distance(word, a) < edit_distance(word, b); });
     return best == known.end() ? "" : *best;
 }
 

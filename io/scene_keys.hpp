@@ -6,8 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 enum class Kind {
     Text,

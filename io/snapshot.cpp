@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-namespace kuzure::io
-{
-namespace
-{
+namespace kuzure::io {
+namespace {
 
 constexpr std::uint8_t vtk_vertex = 1;
 
@@ -16,11 +14,8 @@ struct Column {
     const char* unit;
     int components;
 };
-constexpr Column columns[] = {{"velocity", "m/s", 3},
-                              {"stress", "Pa", 6},
-                              {"density", "kg/m^3", 1},
-                              {"plastic_strain", "1", 1},
-                              {"displacement", "m", 3}};
+constexpr Column columns[] = {
+    {"velocity", "m/s", 3}, {"stress", "Pa", 6}, {"density", "kg/m^3", 1}, {"plastic_strain", "1", 1}, {"displacement", "m", 3}};
 
 bool wanted(const std::vector<std::string>& fields, std::string_view name)
 {
@@ -28,9 +23,8 @@ bool wanted(const std::vector<std::string>& fields, std::string_view name)
 }
 
 /// Rows of this rank as they go to the file: its soil, then its walls.
-class Rows
-{
-  public:
+class Rows {
+public:
     Rows(const Particles& p, const WallPoints& w, int dimensions)
         : p_(p), n_(std::size_t(p.size())), walls_(w.size()), flat_(dimensions == 2)
     {
@@ -40,14 +34,12 @@ class Rows
     {
         buffer_.resize((n_ + walls_) * std::size_t(components));
         double* to = buffer_.data();
-        for (std::size_t i = 0; i < n_; ++i)
-            to = put(to, soil(Index(i)));
-        for (std::size_t i = 0; i < walls_; ++i)
-            to = put(to, wall(i));
+        for (std::size_t i = 0; i < n_; ++i) to = put(to, soil(Index(i)));
+        for (std::size_t i = 0; i < walls_; ++i) to = put(to, wall(i));
         return buffer_;
     }
 
-  private:
+private:
     double* put(double* to, double a) const { return *to = a, to + 1; }
     double* put(double* to, const Vector& a) const
     {
@@ -70,8 +62,7 @@ class Rows
 std::vector<std::string> snapshot_fields()
 {
     std::vector<std::string> names;
-    for (const auto& c : columns)
-        names.emplace_back(c.name);
+    for (const auto& c : columns) names.emplace_back(c.name);
     return names;
 }
 
@@ -80,22 +71,18 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
     // Points, connectivity, offsets, types; id, kind, soil.
     std::uint64_t row = 24 + 8 + 8 + 1 + 8 + 4 + 4;
     for (const auto& c : columns)
-        if (wanted(fields, c.name))
-            row += 8 * std::uint64_t(c.components);
+        if (wanted(fields, c.name)) row += 8 * std::uint64_t(c.components);
     return row * std::uint64_t(points) + 32768;
 }
 
-void write_snapshot(const Team& team, const Path& file, const Particles& p, const WallPoints& walls,
-                    const SnapshotLabel& label)
+void write_snapshot(const Team& team, const Path& file, const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     for (const auto& f : label.fields) {
         const auto known = snapshot_fields();
         if (std::find(known.begin(), known.end(), f) == known.end())
-            throw BadInput(fmt::format("[output] fields: '{}' is not a field: expected some of {}", f,
-                                       fmt::join(known, ", ")));
+            throw BadInput(fmt::format("[output] fields: '{}' is not a field: expected some of {}", f, fmt::join(known, ", ")));
     }
-    ensure(walls.id.size() == walls.size() && walls.density.size() == walls.size(),
-           "wall points without id or density");
+    ensure(walls.id.size() == walls.size() && walls.density.size() == walls.size(), "wall points without id or density");
 
     const auto n = std::size_t(p.size()), mine = n + walls.size();
     const std::int64_t first = team.sum_below(std::int64_t(mine)), total = team.sum(std::int64_t(mine));
@@ -121,8 +108,7 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
     for (const char* count : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
         table(top + "/" + count, std::span<const std::int64_t>(&total, root ? 1 : 0), 1, "1");
     std::vector<std::int64_t> whole(mine + 1);
-    for (std::size_t i = 0; i <= mine; ++i)
-        whole[i] = first + std::int64_t(i);
+    for (std::size_t i = 0; i <= mine; ++i) whole[i] = first + std::int64_t(i);
     const std::span<const std::int64_t> numbers(whole);
     table(top + "/Connectivity", numbers.first(mine), 1, "1");
     table(top + "/Offsets", numbers.first(mine + (last ? 1 : 0)), 1, "1");
@@ -141,17 +127,14 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
     const std::string data = top + "/PointData";
     out.group(data);
     const auto id = p[field::id];
-    for (std::size_t i = 0; i < mine; ++i)
-        whole[i] = i < n ? id[Index(i)] : walls.id[i - n];
+    for (std::size_t i = 0; i < mine; ++i) whole[i] = i < n ? id[Index(i)] : walls.id[i - n];
     table(data + "/id", numbers.first(mine), 1, "1");
     std::vector<std::int32_t> small(mine);
-    for (std::size_t i = 0; i < mine; ++i)
-        small[i] = i < n ? 0 : 1;
+    for (std::size_t i = 0; i < mine; ++i) small[i] = i < n ? 0 : 1;
     table(data + "/kind", std::span<const std::int32_t>(small), 1, "1");
     // Without the column there is one soil only.
     const bool soils = p.has(field::soil);
-    for (std::size_t i = 0; i < mine; ++i)
-        small[i] = i >= n ? -1 : soils ? p[field::soil][Index(i)] : 0;
+    for (std::size_t i = 0; i < mine; ++i) small[i] = i >= n ? -1 : soils ? p[field::soil][Index(i)] : 0;
     table(data + "/soil", std::span<const std::int32_t>(small), 1, "1");
 
     const auto values = [&](std::string_view name) -> std::span<const double> {
@@ -163,8 +146,7 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
                 6, [s = p[field::stress]](Index i) { return s[i]; }, [](std::size_t) { return Stress{}; });
         if (name == "density")
             return rows.of(
-                1, [r = p[field::density]](Index i) { return r[i]; },
-                [&](std::size_t i) { return walls.density[i]; });
+                1, [r = p[field::density]](Index i) { return r[i]; }, [&](std::size_t i) { return walls.density[i]; });
         if (name == "plastic_strain") {
             if (!p.has(field::plastic_strain))
                 return rows.of(
@@ -176,8 +158,7 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
             3, [x, o = p[field::origin]](Index i) { return x[i] - o[i]; }, no_vector);
     };
     for (const auto& c : columns)
-        if (wanted(label.fields, c.name))
-            table(data + "/" + c.name, values(c.name), c.components, c.unit);
+        if (wanted(label.fields, c.name)) table(data + "/" + c.name, values(c.name), c.components, c.unit);
 
     const std::string more = top + "/FieldData";
     out.group(more);
@@ -188,19 +169,16 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
 
 // ---- series
 // ----------------------------------------------------------------------------------------------------------
-Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<double> restart_time)
-    : team_(team), directory_(directory)
+Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<double> restart_time) : team_(team), directory_(directory)
 {
-    if (!restart_time)
-        return;
+    if (!restart_time) return;
     std::string found; // "name time" lines, from rank 0 to all
     on_root(team, [&] {
         namespace fs = std::filesystem;
         std::vector<std::string> names;
         for (const auto& e : fs::directory_iterator(directory)) {
             const std::string name = e.path().filename().string();
-            if (name.size() == 16 && name.starts_with("state_") && name.ends_with(".hdf") &&
-                name.find_first_not_of("0123456789", 6) == 12)
+            if (name.size() == 16 && name.starts_with("state_") && name.ends_with(".hdf") && name.find_first_not_of("0123456789", 6) == 12)
                 names.push_back(name);
         }
         std::sort(names.begin(), names.end());
@@ -213,17 +191,14 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
             } catch (const IoFailed&) {
                 continue; // a damaged picture of the past is no reason not to go on; its number is used again
             }
-            if (time > *restart_time)
-                fs::remove(directory / name);
-            else
-                kept.push_back({{"name", name}, {"time", time}});
+            if (time > *restart_time) fs::remove(directory / name);
+            else kept.push_back({{"name", name}, {"time", time}});
         }
         found = kept.dump();
     });
     for (const auto& e : nlohmann::json::parse(team.broadcast(found)))
         entries_.push_back({e["name"].get<std::string>(), e["time"].get<double>()});
-    if (!entries_.empty())
-        next_ = std::stoi(entries_.back().name.substr(6, 6)) + 1;
+    if (!entries_.empty()) next_ = std::stoi(entries_.back().name.substr(6, 6)) + 1;
     write_series();
 }
 
@@ -239,8 +214,7 @@ Path Snapshots::write(const Particles& p, const WallPoints& walls, const Snapsho
 
 std::optional<double> Snapshots::last_time() const
 {
-    if (entries_.empty())
-        return {};
+    if (entries_.empty()) return {};
     return entries_.back().time;
 }
 
@@ -248,8 +222,7 @@ void Snapshots::write_series() const
 {
     on_root(team_, [&] {
         nlohmann::ordered_json files = nlohmann::ordered_json::array();
-        for (const auto& e : entries_)
-            files.push_back({{"name", e.name}, {"time", e.time}});
+        for (const auto& e : entries_) files.push_back({{"name", e.name}, {"time", e.time}});
         const nlohmann::ordered_json series = {{"file-series-version", "1.0"}, {"files", files}};
         write_atomically(directory_ / "state.hdf.series", series.dump(1) + "\n");
     });

@@ -6,8 +6,7 @@
 #include "solver/core/particles.hpp"
 #include <optional>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// Names of the fields a snapshot can hold besides id, kind and soil, in the file's order.
 std::vector<std::string> snapshot_fields();
@@ -29,9 +28,8 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
 void write_snapshot(const Team&, const Path& file, const Particles&, const WallPoints&, const SnapshotLabel&);
 
 /// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series.
-class Snapshots
-{
-  public:
+class Snapshots {
+public:
     /// Collective; the directory exists. With a restart time the snapshots up to it stay and later ones are
     /// removed; without, counting starts at 0.
     Snapshots(const Team&, const Path& directory, std::optional<double> restart_time = {});
@@ -42,7 +40,7 @@ class Snapshots
     std::optional<double> last_time() const;
     int count() const { return next_; }
 
-  private:
+private:
     struct Entry {
         std::string name;
         double time;

@@ -1,23 +1,20 @@
 #include "io/summary.hpp"
 #include <nlohmann/json.hpp>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 using nlohmann::ordered_json;
 
 ordered_json effects_json(const std::vector<scene::EffectNote>& notes)
 {
     ordered_json effects = {{"on", ordered_json::array()}, {"off", ordered_json::array()}};
-    for (const auto& note : notes)
-        effects[note.on ? "on" : "off"].push_back({{"name", note.name}, {"why", note.why}});
+    for (const auto& note : notes) effects[note.on ? "on" : "off"].push_back({{"name", note.name}, {"why", note.why}});
     return effects;
 }
 
 ordered_json to_json(const Summary& s)
 {
     ordered_json energy = ordered_json::object();
-    for (const auto& [name, value] : s.energy)
-        energy[name] = value;
+    for (const auto& [name, value] : s.energy) energy[name] = value;
     ordered_json all = {
         {"status", s.status},
         {"exit_code", s.exit_code},
@@ -38,23 +35,17 @@ ordered_json to_json(const Summary& s)
         {"effects", effects_json(s.effects)},
         {"state_hash", s.state_hash},
     };
-    if (!s.message.empty())
-        all["message"] = s.message;
+    if (!s.message.empty()) all["message"] = s.message;
     return all;
 }
 
-void write_summary(const Team& team, const Path& file, const Summary& summary)
-{
-    write_json(team, file, to_json(summary));
-}
+void write_summary(const Team& team, const Path& file, const Summary& summary) { write_json(team, file, to_json(summary)); }
 
 void write_json(const Team& team, const Path& file, const ordered_json& value)
 {
     // A message may carry bytes that are not UTF-8 (a file name): replaced, never a reason to lose the
     // summary.
-    on_root(team, [&] {
-        write_atomically(file, value.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
-    });
+    on_root(team, [&] { write_atomically(file, value.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"); });
 }
 
 } // namespace kuzure::io

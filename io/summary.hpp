@@ -4,8 +4,7 @@
 #include "solver/scene/scene.hpp"
 #include <nlohmann/json_fwd.hpp>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// The content of summary.json; names as in the file.
 struct Summary {

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace kuzure::io
-{
+namespace kuzure::io {
 
 /// The wall particles of this rank. The three have one length.
 struct WallPoints {

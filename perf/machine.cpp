@@ -12,10 +12,8 @@
 #include <omp.h>
 #include <unistd.h>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 using Clock = std::chrono::steady_clock;
 
@@ -29,24 +27,20 @@ constexpr int register_bytes = 16, chains = 12;
 
 // The project compiles with -ffp-contract=off for equal bits; here the fused instruction is the very thing
 // measured.
-template <class T>
-__attribute__((noinline, optimize("fp-contract=fast"))) T multiply_add(T factor, T summand, long rounds)
+template <class T> __attribute__((noinline, optimize("fp-contract=fast"))) T multiply_add(T factor, T summand, long rounds)
 {
     typedef T Vec __attribute__((vector_size(register_bytes)));
     const Vec a = factor - Vec{}, b = summand - Vec{};
     Vec x[chains];
 #pragma GCC unroll 16
-    for (int k = 0; k < chains; ++k)
-        x[k] = b * T(k + 1);
+    for (int k = 0; k < chains; ++k) x[k] = b * T(k + 1);
     for (long n = 0; n < rounds; ++n) {
 #pragma GCC unroll 16
-        for (int k = 0; k < chains; ++k)
-            x[k] = x[k] * a + b;
+        for (int k = 0; k < chains; ++k) x[k] = x[k] * a + b;
     }
     Vec sum{};
 #pragma GCC unroll 16
-    for (int k = 0; k < chains; ++k)
-        sum += x[k];
+    for (int k = 0; k < chains; ++k) sum += x[k];
     return sum[0];
 }
 
@@ -79,13 +73,11 @@ template <class T> double gflops(int threads)
     for (int repeat = 0; repeat < 8; ++repeat) {
         const double seconds = seconds_of(threads, [&](int) {
             const T x = multiply_add(a, b, rounds);
-            if (x == T(-1))
-                sink = x;
+            if (x == T(-1)) sink = x;
         });
         best = std::max(best, double(rounds) * flops_a_round * threads / seconds * 1e-9);
         // The first repeat wakes the processor and finds the length: 30 ms each.
-        if (repeat == 0)
-            rounds = std::clamp(long(double(rounds) * 0.03 / seconds), 1L << 12, 1L << 34);
+        if (repeat == 0) rounds = std::clamp(long(double(rounds) * 0.03 / seconds), 1L << 12, 1L << 34);
     }
     return best;
 }
@@ -103,8 +95,7 @@ std::size_t triad_elements()
 double gbytes(int threads)
 {
     const std::size_t n = triad_elements();
-    const auto a = std::make_unique_for_overwrite<double[]>(n),
-               b = std::make_unique_for_overwrite<double[]>(n),
+    const auto a = std::make_unique_for_overwrite<double[]>(n), b = std::make_unique_for_overwrite<double[]>(n),
                c = std::make_unique_for_overwrite<double[]>(n);
     double *const x = a.get(), *const y = b.get(), *const z = c.get();
     const auto first = [&](int thread) { return n * std::size_t(thread) / std::size_t(threads); };
@@ -121,8 +112,7 @@ double gbytes(int threads)
         const double seconds = seconds_of(threads, [&](int t) {
             const std::size_t end = first(t + 1);
 #pragma omp simd
-            for (std::size_t i = first(t); i < end; ++i)
-                x[i] = y[i] + s * z[i];
+            for (std::size_t i = first(t); i < end; ++i) x[i] = y[i] + s * z[i];
         });
         best = std::max(best, double(n) * 24 / seconds * 1e-9);
     }
@@ -144,8 +134,7 @@ std::string cpu_name()
     std::ifstream info("/proc/cpuinfo");
     for (std::string line; std::getline(info, line);)
         if (line.starts_with("model name"))
-            if (const auto colon = line.find(": "); colon != line.npos)
-                return line.substr(colon + 2);
+            if (const auto colon = line.find(": "); colon != line.npos) return line.substr(colon + 2);
     return "unknown";
 }
 
@@ -172,24 +161,19 @@ Machine measure_machine(std::string_view instruction_set, int threads)
 
 std::filesystem::path machine_cache()
 {
-    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache)
-        return std::filesystem::path(cache) / "kuzure";
-    if (const char* home = std::getenv("HOME"); home && *home)
-        return std::filesystem::path(home) / ".cache" / "kuzure";
+    if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return std::filesystem::path(cache) / "kuzure";
+    if (const char* home = std::getenv("HOME"); home && *home) return std::filesystem::path(home) / ".cache" / "kuzure";
     return {};
 }
 
 Machine this_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache)
 {
-    if (cache.empty())
-        return measure_machine(instruction_set, threads);
-    const auto file =
-        cache / as_file_name(fmt::format("machine-{}-{}-{}.json", host_name(), instruction_set, threads));
+    if (cache.empty()) return measure_machine(instruction_set, threads);
+    const auto file = cache / as_file_name(fmt::format("machine-{}-{}-{}.json", host_name(), instruction_set, threads));
     if (std::ifstream kept(file); kept) {
         const std::string text(std::istreambuf_iterator<char>(kept), {});
-        if (const auto m = machine_from_json(text); m && m->host == host_name() && m->cpu == cpu_name() &&
-                                                    m->instruction_set == instruction_set &&
-                                                    m->threads == threads)
+        if (const auto m = machine_from_json(text);
+            m && m->host == host_name() && m->cpu == cpu_name() && m->instruction_set == instruction_set && m->threads == threads)
             return *m;
     }
     const Machine measured = measure_machine(instruction_set, threads);
@@ -204,10 +188,8 @@ Machine this_machine(std::string_view instruction_set, int threads, const std::f
         out.close();
         written = out.good();
     }
-    if (written)
-        std::filesystem::rename(part, file, ignored);
-    else
-        std::filesystem::remove(part, ignored);
+    if (written) std::filesystem::rename(part, file, ignored);
+    else std::filesystem::remove(part, ignored);
     return measured;
 }
 
@@ -240,10 +222,9 @@ std::optional<Machine> machine_from_json(std::string_view text)
                   .gflops_float_all = j.at("gflops_float_all"),
                   .gbytes_one = j.at("gbytes_one"),
                   .gbytes_all = j.at("gbytes_all")};
-        for (const double rate : {m.gflops_double_one, m.gflops_double_all, m.gflops_float_one,
-                                  m.gflops_float_all, m.gbytes_one, m.gbytes_all})
-            if (!(rate > 0))
-                return {};
+        for (const double rate :
+             {m.gflops_double_one, m.gflops_double_all, m.gflops_float_one, m.gflops_float_all, m.gbytes_one, m.gbytes_all})
+            if (!(rate > 0)) return {};
         return m;
     } catch (const nlohmann::json::exception&) {
         return {};

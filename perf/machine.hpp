@@ -6,8 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// Measured ceilings of one host. Rates count 1e9 a second; a fused multiply-add is two operations; bandwidth
 /// is that of a(i) = b(i) + s c(i), 24 bytes an element (write-allocate not counted).
@@ -33,8 +32,7 @@ Machine measure_machine(std::string_view instruction_set, int threads);
 std::filesystem::path machine_cache();
 /// The kept measurement of this host, processor, instruction set and thread count; else measure and keep it.
 /// A cache that cannot be read or written is no error: it is measured again.
-Machine this_machine(std::string_view instruction_set, int threads,
-                     const std::filesystem::path& cache = machine_cache());
+Machine this_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache = machine_cache());
 
 /// As JSON text, and back; nothing where the text is not that of a Machine.
 std::string to_json(const Machine&);

@@ -7,8 +7,7 @@
 #include <string_view>
 #include <utility>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// The rows of the timer report, in the order in which they are printed.
 enum class Phase {
@@ -43,9 +42,8 @@ inline constexpr int n_phases = int(Phase::Count);
 
 /// Names as they stand in timers.json and timers.txt.
 inline constexpr std::array<std::string_view, n_phases> phase_names{
-    "setup",      "partition",      "migrate",       "sort",       "ghosts",  "lists",   "time step",
-    "begin halo", "interior pairs", "wait for halo", "rim pairs",  "walls",   "effects", "update",
-    "reduce",     "snapshot",       "history",       "checkpoint", "picture", "other"};
+    "setup",     "partition", "migrate", "sort",   "ghosts", "lists",    "time step", "begin halo", "interior pairs", "wait for halo",
+    "rim pairs", "walls",     "effects", "update", "reduce", "snapshot", "history",   "checkpoint", "picture",        "other"};
 static_assert(std::ranges::none_of(phase_names, &std::string_view::empty), "every phase needs a name");
 
 constexpr std::string_view name(Phase phase) { return phase_names[int(phase)]; }
@@ -53,9 +51,8 @@ constexpr std::string_view name(Phase phase) { return phase_names[int(phase)]; }
 /// Stopwatches of one rank, used by its main thread alone. Phases may nest: an inner phase stops the clock of
 /// the one around it, so that the rows add up to the whole. One clock reading at the start of a phase and one
 /// at its end.
-class Timers
-{
-  public:
+class Timers {
+public:
     /// Run `work`, charge its time to `phase`, and hand back what it returns.
     template <class Work> decltype(auto) timed(Phase phase, Work&& work)
     {
@@ -79,12 +76,11 @@ class Timers
     double total() const
     {
         double sum = 0;
-        for (int p = 0; p < n_phases; ++p)
-            sum += seconds(Phase(p));
+        for (int p = 0; p < n_phases; ++p) sum += seconds(Phase(p));
         return sum;
     }
 
-  private:
+private:
     using Clock = std::chrono::steady_clock;
     static constexpr int outside = n_phases;
 

@@ -5,16 +5,13 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 nlohmann::ordered_json as_json(const PhaseRow& row)
 {
-    nlohmann::ordered_json j{{"seconds", {{"min", row.min}, {"mean", row.mean}, {"max", row.max}}},
-                             {"calls", row.calls},
-                             {"share", row.share}};
+    nlohmann::ordered_json j{
+        {"seconds", {{"min", row.min}, {"mean", row.mean}, {"max", row.max}}}, {"calls", row.calls}, {"share", row.share}};
     if (row.flops > 0) {
         j["gflop_per_second"] = row.gflops();
         j["flop_per_byte"] = row.intensity();
@@ -26,8 +23,7 @@ nlohmann::ordered_json as_json(const PhaseRow& row)
 std::string grouped(std::int64_t n)
 {
     std::string s = std::to_string(n);
-    for (auto at = std::ptrdiff_t(s.size()) - 3; at > (n < 0); at -= 3)
-        s.insert(std::size_t(at), 1, ' ');
+    for (auto at = std::ptrdiff_t(s.size()) - 3; at > (n < 0); at -= 3) s.insert(std::size_t(at), 1, ' ');
     return s;
 }
 
@@ -73,8 +69,7 @@ PhaseReport phase_report(const Timers& timers, const WorkDone& mine, int threads
                         .flops = sums[n + k],
                         .bytes = sums[2 * n + k]};
     };
-    for (int p = 0; p < n_phases; ++p)
-        report.rows[p] = row(p);
+    for (int p = 0; p < n_phases; ++p) report.rows[p] = row(p);
     report.pair_loop = row(pair_loop);
     report.total = row(whole);
     // Sums of doubles come in no fixed order: the root's go to all.
@@ -98,10 +93,8 @@ std::string PhaseReport::json() const
                              {"pair_loop", as_json(pair_loop)},
                              {"phases", nlohmann::ordered_json::object()}};
     for (int p = 0; p < n_phases; ++p)
-        if (rows[p].calls > 0)
-            j["phases"][std::string(name(Phase(p)))] = as_json(rows[p]);
-    if (machine)
-        j["machine"] = nlohmann::ordered_json::parse(to_json(*machine));
+        if (rows[p].calls > 0) j["phases"][std::string(name(Phase(p)))] = as_json(rows[p]);
+    if (machine) j["machine"] = nlohmann::ordered_json::parse(to_json(*machine));
     return j.dump(2) + '\n';
 }
 
@@ -112,31 +105,27 @@ std::string PhaseReport::text() const
         fmt::format_to(std::back_inserter(out), f, std::forward<A>(a)...);
         out += '\n';
     };
-    line("Wall time by phase: {} rank{} of {} thread{}, {} steps", ranks, ranks == 1 ? "" : "s", threads,
-         threads == 1 ? "" : "s", grouped(work.steps));
+    line("Wall time by phase: {} rank{} of {} thread{}, {} steps", ranks, ranks == 1 ? "" : "s", threads, threads == 1 ? "" : "s",
+         grouped(work.steps));
     line("");
-    line("{:<16}{:>11}{:>11}{:>11}{:>8}{:>12}{:>10}{:>11}", "", "min s", "mean s", "max s", "share", "calls",
-         "Gflop/s", "flop/byte");
+    line("{:<16}{:>11}{:>11}{:>11}{:>8}{:>12}{:>10}{:>11}", "", "min s", "mean s", "max s", "share", "calls", "Gflop/s", "flop/byte");
     const auto print = [&](std::string_view title, const PhaseRow& row) {
         const bool counted = row.flops > 0;
-        line("{:<16}{:>11.3f}{:>11.3f}{:>11.3f}{:>7.1f}%{:>12}{:>10}{:>11}", title, row.min, row.mean,
-             row.max, 100 * row.share, grouped(row.calls), counted ? fmt::format("{:.2f}", row.gflops()) : "",
+        line("{:<16}{:>11.3f}{:>11.3f}{:>11.3f}{:>7.1f}%{:>12}{:>10}{:>11}", title, row.min, row.mean, row.max, 100 * row.share,
+             grouped(row.calls), counted ? fmt::format("{:.2f}", row.gflops()) : "",
              counted && row.bytes > 0 ? fmt::format("{:.2f}", row.intensity()) : "");
     };
     for (int p = 0; p < n_phases; ++p)
-        if (rows[p].calls > 0)
-            print(name(Phase(p)), rows[p]);
+        if (rows[p].calls > 0) print(name(Phase(p)), rows[p]);
     line("{}", std::string(90, '-'));
     print("total", total);
 
-    const auto each = [](double seconds, std::int64_t count) {
-        return count > 0 ? seconds / double(count) : 0;
-    };
+    const auto each = [](double seconds, std::int64_t count) { return count > 0 ? seconds / double(count) : 0; };
     line("");
     line("pairs               {} directed, {:.1f} per soil particle and step", grouped(work.pairs),
          each(double(work.pairs), work.particle_steps));
-    line("time                {:.3f} ms a step, {:.1f} ns a soil particle and step",
-         1e3 * each(total.max, work.steps), 1e9 * each(total.max, work.particle_steps));
+    line("time                {:.3f} ms a step, {:.1f} ns a soil particle and step", 1e3 * each(total.max, work.steps),
+         1e9 * each(total.max, work.particle_steps));
     if (pair_loop.max > 0) {
         line("pair loop           {:.2f} ns a pair, {:.2f} Gflop/s, {:.2f} flop/byte, slowest rank {:.2f} of "
              "the mean",
@@ -145,9 +134,8 @@ std::string PhaseReport::text() const
     }
     if (machine) {
         line("this machine        {}, {}", machine->cpu, machine->instruction_set);
-        line("  multiply-add      {:.0f} Gflop/s double, {:.0f} single (one thread {:.0f}, {:.0f})",
-             machine->gflops_double_all, machine->gflops_float_all, machine->gflops_double_one,
-             machine->gflops_float_one);
+        line("  multiply-add      {:.0f} Gflop/s double, {:.0f} single (one thread {:.0f}, {:.0f})", machine->gflops_double_all,
+             machine->gflops_float_all, machine->gflops_double_one, machine->gflops_float_one);
         line("  memory            {:.0f} GB/s (one thread {:.0f})", machine->gbytes_all, machine->gbytes_one);
     }
     return out;

@@ -8,8 +8,7 @@
 #include <optional>
 #include <string>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// What one rank has done in the time that its timers hold. Pairs are directed, soil i <- any j within 2 h.
 struct WorkDone {

@@ -52,7 +52,8 @@ struct Cloud {
                     const double rho = s.soils[0].density * (1 + 0.002 * u(g));
                     p[field::density].set(i, rho), p[field::half_density].set(i, rho);
                     const double depth = s.soils[0].density * 9.81 * (n * dx - z);
-                    const Stress sigma{-0.5 * depth + 50 * u(g), -0.5 * depth + 50 * u(g), -depth + 50 * u(g), 100 * u(g), 100 * u(g), 100 * u(g)};
+                    const Stress sigma{
+                        -0.5 * depth + 50 * u(g), -0.5 * depth + 50 * u(g), -depth + 50 * u(g), 100 * u(g), 100 * u(g), 100 * u(g)};
                     p[field::stress].set(i, sigma), p[field::half_stress].set(i, sigma);
                     p[field::id].set(i, std::int64_t(i));
                 }
@@ -68,7 +69,8 @@ struct Cloud {
     void build(int width, double skin)
     {
         const auto x = std::as_const(particles)[field::position];
-        const SortedPoints owned{x.column[0], x.column[1], x.column[2], std::as_const(particles)[field::id].column[0], &sorted, particles.size()};
+        const SortedPoints owned{x.column[0], x.column[1],     x.column[2], std::as_const(particles)[field::id].column[0],
+                                 &sorted,     particles.size()};
         static const ColumnSort none{.start = {0}};
         const SortedPoints ghosts{.columns = &none};
         lists.build(columns, owned, ghosts, {}, scene.support() * (1 + skin), width);
@@ -82,7 +84,8 @@ struct Cloud {
         for (Index i = 0; i < p.size(); ++i) {
             const auto& m = soils[p[field::soil][i]];
             records[i] = make_record<T>(place, p[field::position][i], p[field::velocity][i],
-                                        scene.particle_volume() * m.density / p[field::density][i], p[field::density][i], p[field::stress][i], m.sound_speed);
+                                        scene.particle_volume() * m.density / p[field::density][i], p[field::density][i],
+                                        p[field::stress][i], m.sound_speed);
         }
         far_away(records);
     }

@@ -4,8 +4,7 @@
 
 namespace kuzure {
 
-StateEnergy state_energy(const Team& team, const Particles& p, std::span<const Material> soils, double volume, Vector gravity,
-                         double unit)
+StateEnergy state_energy(const Team& team, const Particles& p, std::span<const Material> soils, double volume, Vector gravity, double unit)
 {
     const auto x = p[field::position], o = p[field::origin], v = p[field::velocity];
     const auto s = p[field::stress];

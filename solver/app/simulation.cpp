@@ -41,10 +41,7 @@ Vector domain_origin(const scene::Filling& f, const Scene& s)
     if (s.space.periodic[2]) o.z = s.space.low->z;
     return o;
 }
-Vector period(const Scene& s)
-{
-    return s.space.low && s.space.high ? *s.space.high - *s.space.low : Vector{1, 1, 1};
-}
+Vector period(const Scene& s) { return s.space.low && s.space.high ? *s.space.high - *s.space.low : Vector{1, 1, 1}; }
 
 template <class T> Record<T> far_away()
 {
@@ -60,8 +57,8 @@ template <class T> Record<T> far_away()
 Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank),
-              scene.space.periodic, scene.space.low.value_or(Vector{}), period(scene)),
+      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
+              scene.space.low.value_or(Vector{}), period(scene)),
       buffers_(Buffers<double>(scene.smoothing_length()))
 {
     timers_.timed(Phase::Setup, [&] {
@@ -82,8 +79,8 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
 Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank),
-              scene.space.periodic, scene.space.low.value_or(Vector{}), period(scene)),
+      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
+              scene.space.low.value_or(Vector{}), period(scene)),
       particles_(std::move(particles)), buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
 {
     timers_.timed(Phase::Setup, [&] {
@@ -125,8 +122,8 @@ void Simulation::prepare()
             const Material& m = soils_[body.soil];
             const double mass = m.density * scene_.particle_volume() * double(filling_.body_count(int(k)));
             const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene_.space.spacing});
-            scale += mass * (length(forces_.gravity) * size + 0.5 * dot(body.velocity, body.velocity) +
-                             1e-6 * m.sound_speed * m.sound_speed);
+            scale +=
+                mass * (length(forces_.gravity) * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.sound_speed * m.sound_speed);
         }
         clock_.energy_unit = std::exp2(std::floor(std::log2(scale)) - 58);
     }
@@ -147,9 +144,9 @@ void Simulation::cut_by_counts()
             for (auto z = lo[2]; z <= hi[2]; ++z, ++k) {
                 if (k % comm_.size() != comm_.rank()) continue;
                 const double inset = 1e-9 * scene_.space.spacing;
-                const scene::Box box{{edge(origin.x, size.x, x), edge(origin.y, size.y, y), edge(origin.z, size.z, z)},
-                                     {edge(origin.x, size.x, x + 1) - inset, edge(origin.y, size.y, y + 1) - inset,
-                                      edge(origin.z, size.z, z + 1) - inset}};
+                const scene::Box box{
+                    {edge(origin.x, size.x, x), edge(origin.y, size.y, y), edge(origin.z, size.z, z)},
+                    {edge(origin.x, size.x, x + 1) - inset, edge(origin.y, size.y, y + 1) - inset, edge(origin.z, size.z, z + 1) - inset}};
                 const double n = double(filling_.soil_count_in(box));
                 if (n > 0) mine.push_back({{x, y, z}, n, n});
             }
@@ -170,9 +167,9 @@ void Simulation::fill()
         if (domain_.owners()[k] != comm_.rank()) continue;
         const Block b = domain_.blocks()[k];
         const double margin = 1e-6 * scene_.space.spacing;
-        const scene::Box box{{origin.x + size.x * b[0] - margin, origin.y + size.y * b[1] - margin, origin.z + size.z * b[2] - margin},
-                             {origin.x + size.x * (b[0] + 1) + margin, origin.y + size.y * (b[1] + 1) + margin,
-                              origin.z + size.z * (b[2] + 1) + margin}};
+        const scene::Box box{
+            {origin.x + size.x * b[0] - margin, origin.y + size.y * b[1] - margin, origin.z + size.z * b[2] - margin},
+            {origin.x + size.x * (b[0] + 1) + margin, origin.y + size.y * (b[1] + 1) + margin, origin.z + size.z * (b[2] + 1) + margin}};
         filling_.for_each_soil_in(box, [&](std::int64_t id, Vector x, int body) {
             if (domain_.block_of(x) == b) start.push_back({id, x, body});
         });
@@ -285,9 +282,12 @@ Wishes Simulation::step(Wishes mine)
                 a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
                 a.pairs += b.pairs;
                 auto& e = a.extremes;
-                e = {std::max(e.acceleration2, b.extremes.acceleration2), std::max(e.signal, b.extremes.signal),
-                     std::max(e.moved2, b.extremes.moved2),               std::max(e.speed2, b.extremes.speed2),
-                     std::max(e.bad, b.extremes.bad),                     std::max(e.outside, b.extremes.outside)};
+                e = {std::max(e.acceleration2, b.extremes.acceleration2),
+                     std::max(e.signal, b.extremes.signal),
+                     std::max(e.moved2, b.extremes.moved2),
+                     std::max(e.speed2, b.extremes.speed2),
+                     std::max(e.bad, b.extremes.bad),
+                     std::max(e.outside, b.extremes.outside)};
             };
             add(result, rim);
             buffers.now.swap(buffers.next);
@@ -299,7 +299,7 @@ Wishes Simulation::step(Wishes mine)
     my_particle_steps_ += particles_.size();
     clock_.dissipated.add(result.energy, clock_.energy_unit);
     clock_.step += 1;
-    clock_.time = scene_.time.step ? double(clock_.step) * *scene_.time.step
+    clock_.time = scene_.time.step                                   ? double(clock_.step) * *scene_.time.step
                   : clock_.time + dt * (1 + 1e-9) >= scene_.time.end ? scene_.time.end
                                                                      : clock_.time + dt;
     clock_.dt = dt;
@@ -346,14 +346,16 @@ void Simulation::report_failure()
     if (where >= 0 && mine == lowest) {
         const Vector x = p[field::position][where], v = p[field::velocity][where];
         const bool box = clock_.extremes.bad == 0;
-        text = box ? fmt::format("particle {} (body {}) left the box at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. "
-                                 "Remedy: a larger space.low/space.high, a longer wall, or a smaller step",
-                                 mine, filling_.body_of(mine), x.x, x.y, x.z, length(v), clock_.step, clock_.time)
-                   : fmt::format("the numbers of particle {} (body {}) are no longer finite at ({:.4g}, {:.4g}, {:.4g}) m in step {}, t = {:.6g} s: "
-                                 "the time step is too long for the stiffness (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
-                                 "accuracy.cfl, or more viscosity",
-                                 mine, filling_.body_of(mine), x.x, x.y, x.z, clock_.step, clock_.time, clock_.dt,
-                                 scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed);
+        text =
+            box ? fmt::format("particle {} (body {}) left the box at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. "
+                              "Remedy: a larger space.low/space.high, a longer wall, or a smaller step",
+                              mine, filling_.body_of(mine), x.x, x.y, x.z, length(v), clock_.step, clock_.time)
+                : fmt::format(
+                      "the numbers of particle {} (body {}) are no longer finite at ({:.4g}, {:.4g}, {:.4g}) m in step {}, t = {:.6g} s: "
+                      "the time step is too long for the stiffness (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
+                      "accuracy.cfl, or more viscosity",
+                      mine, filling_.body_of(mine), x.x, x.y, x.z, clock_.step, clock_.time, clock_.dt,
+                      scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed);
         root = comm_.rank();
     }
     root = int(comm_.max(std::int64_t(root)));
@@ -437,11 +439,13 @@ void Simulation::rebuild(bool sort_anew)
                 for (Index i = 0; i < n; ++i) to.column[c][i] = x.column[c][i];
         });
     }
-    together([&] { timers_.timed(Phase::Sort, [&] {
-        const auto x = p[field::sorted_position];
-        sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
-        p.gather(sorted_.order);
-    }); });
+    together([&] {
+        timers_.timed(Phase::Sort, [&] {
+            const auto x = p[field::sorted_position];
+            sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
+            p.gather(sorted_.order);
+        });
+    });
     timers_.timed(Phase::Ghosts, [&] {
         halo_.emplace(comm_, domain_.plan_halo(std::as_const(p)[field::sorted_position], p.size(), reach_), row_bytes());
         const auto arrived = halo_->ghosts(p);
@@ -449,7 +453,8 @@ void Simulation::rebuild(bool sort_anew)
         Array<double> x(n_ghosts_), y(n_ghosts_), z(n_ghosts_);
         Array<std::int64_t> id(n_ghosts_);
         for (Index k = 0; k < n_ghosts_; ++k)
-            x[k] = arrived[k].sorted_position.x, y[k] = arrived[k].sorted_position.y, z[k] = arrived[k].sorted_position.z, id[k] = arrived[k].id;
+            x[k] = arrived[k].sorted_position.x, y[k] = arrived[k].sorted_position.y, z[k] = arrived[k].sorted_position.z,
+            id[k] = arrived[k].id;
         ghost_sorted_ = sort_into_columns(columns_, x.data(), y.data(), z.data(), id.data(), n_ghosts_);
         ghost_x_.resize(n_ghosts_), ghost_y_.resize(n_ghosts_), ghost_z_.resize(n_ghosts_), ghost_id_.resize(n_ghosts_);
         std::vector<Index> slot(n_ghosts_);
@@ -516,7 +521,8 @@ void Simulation::renew_walls()
                 to.wall = &scene_.walls[w];
                 to.x.resize(n), to.y.resize(n), to.z.resize(n);
                 for (std::size_t k = 0; k < n; ++k)
-                    to.x[k] = buffers.place(walls_[w].x[k]), to.y[k] = buffers.place(walls_[w].y[k]), to.z[k] = buffers.place(walls_[w].z[k]);
+                    to.x[k] = buffers.place(walls_[w].x[k]), to.y[k] = buffers.place(walls_[w].y[k]),
+                    to.z[k] = buffers.place(walls_[w].z[k]);
             }
         },
         buffers_);
@@ -566,7 +572,8 @@ double Simulation::residual(const Ledger& l) const
 {
     const double excess = l.sum() - clock_.energy_at_start;
     const double drop = -l.state.potential;
-    const double scale = drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
+    const double scale =
+        drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
     return scale > 0 ? excess / scale : 0;
 }
 

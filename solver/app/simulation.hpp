@@ -27,11 +27,11 @@ struct Wishes {
 
 /// Where a run stands, beside the particles: what a checkpoint keeps to go on bit for bit.
 struct Clock {
-    double time = 0;      // s
+    double time = 0; // s
     std::int64_t step = 0;
-    double dt = 0;        // s, length of the step before
-    Extremes extremes{};  // of the step before, over all particles
-    std::int64_t pairs = 0; // summed over steps and ranks (kept by rank 0)
+    double dt = 0;              // s, length of the step before
+    Extremes extremes{};        // of the step before, over all particles
+    std::int64_t pairs = 0;     // summed over steps and ranks (kept by rank 0)
     DissipatedUnits dissipated; // over ranks (kept by rank 0)
     double energy_at_start = 0; // J
     double energy_unit = 0;     // J

@@ -52,8 +52,7 @@ inline constexpr struct Soil : Field<"soil", "1", Shape::Scalar, std::int32_t> {
 } soil;
 } // namespace field
 
-using AllFields =
-    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
-               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil>;
+using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
+                             field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil>;
 
 } // namespace kuzure

@@ -47,8 +47,7 @@ private:
     {
         if constexpr (S == Shape::Scalar) f(0, a);
         else if constexpr (S == Shape::Vector) f(0, a.x), f(1, a.y), f(2, a.z);
-        else if constexpr (S == Shape::Symmetric)
-            f(0, a.xx), f(1, a.yy), f(2, a.zz), f(3, a.xy), f(4, a.yz), f(5, a.xz);
+        else if constexpr (S == Shape::Symmetric) f(0, a.xx), f(1, a.yy), f(2, a.zz), f(3, a.xy), f(4, a.yz), f(5, a.xz);
         else f(0, a.x.x), f(1, a.x.y), f(2, a.x.z), f(3, a.y.x), f(4, a.y.y), f(5, a.y.z), f(6, a.z.x), f(7, a.z.y), f(8, a.z.z);
     }
 };
@@ -141,7 +140,9 @@ public:
 private:
     template <class F> using Columns = std::array<Array<typename F::Number>, F::components>;
     template <class Tuple> struct StorageOf;
-    template <class... F> struct StorageOf<std::tuple<F...>> { using type = std::tuple<std::pair<F, Columns<F>>...>; };
+    template <class... F> struct StorageOf<std::tuple<F...>> {
+        using type = std::tuple<std::pair<F, Columns<F>>...>;
+    };
 
     template <class F> Columns<F>& columns() { return std::get<std::pair<F, Columns<F>>>(storage_).second; }
     template <class F> const Columns<F>& columns() const { return std::get<std::pair<F, Columns<F>>>(storage_).second; }

@@ -35,9 +35,18 @@ template <class T, int W> struct Simd {
 };
 
 namespace detail {
-template <class V> struct NumberOf { using type = typename V::Number; static constexpr int lanes = V::lanes; };
-template <> struct NumberOf<double> { using type = double; static constexpr int lanes = 1; };
-template <> struct NumberOf<float> { using type = float; static constexpr int lanes = 1; };
+template <class V> struct NumberOf {
+    using type = typename V::Number;
+    static constexpr int lanes = V::lanes;
+};
+template <> struct NumberOf<double> {
+    using type = double;
+    static constexpr int lanes = 1;
+};
+template <> struct NumberOf<float> {
+    using type = float;
+    static constexpr int lanes = 1;
+};
 } // namespace detail
 
 template <class V> using number = typename detail::NumberOf<V>::type;
@@ -247,8 +256,7 @@ template <class V> KUZURE_INLINE void store(number<V>* p, V a)
 template <class V> KUZURE_INLINE void store_first(number<V>* p, V a, int n)
 {
     if (n >= width<V>) return store(p, a);
-    if constexpr (width<V> > 1)
-    {
+    if constexpr (width < V >> 1) {
         const detail::Lanes lanes(a);
         for (int k = 0; k < n; ++k) p[k] = lanes[k];
     }
@@ -288,7 +296,9 @@ KUZURE_T T largest(Simd<T, W> a)
 // ---- reciprocals ---------------------------------------------------------------------------------------------------
 /// {1/sqrt(a), 1/b}. Where the machine divides slowly (AVX-512): 14-bit estimates and one third-order Newton step each,
 /// below 1e-12; elsewhere one IEEE square root and one division serve both.
-template <class V> struct Reciprocals { V inverse_sqrt, inverse; };
+template <class V> struct Reciprocals {
+    V inverse_sqrt, inverse;
+};
 template <class V> KUZURE_INLINE Reciprocals<V> reciprocals(V a, V b)
 {
     using T = number<V>;

@@ -39,10 +39,26 @@ public:
         return v != 0;
     }
     bool any(bool mine) const { return !all(!mine); }
-    double max(double v) const { max(std::span(&v, 1)); return v; }
-    double min(double v) const { min(std::span(&v, 1)); return v; }
-    std::int64_t sum(std::int64_t v) const { sum(std::span(&v, 1)); return v; }
-    std::int64_t max(std::int64_t v) const { max(std::span(&v, 1)); return v; }
+    double max(double v) const
+    {
+        max(std::span(&v, 1));
+        return v;
+    }
+    double min(double v) const
+    {
+        min(std::span(&v, 1));
+        return v;
+    }
+    std::int64_t sum(std::int64_t v) const
+    {
+        sum(std::span(&v, 1));
+        return v;
+    }
+    std::int64_t max(std::int64_t v) const
+    {
+        max(std::span(&v, 1));
+        return v;
+    }
     /// The root's text on every rank.
     std::string broadcast(std::string s, int root = 0) const
     {
@@ -56,10 +72,10 @@ public:
 /// A team of one.
 class Alone final : public Team {
 public:
+    using Team::broadcast;
     using Team::max;
     using Team::min;
     using Team::sum;
-    using Team::broadcast;
     int rank() const override { return 0; }
     int size() const override { return 1; }
     void barrier() const override {}

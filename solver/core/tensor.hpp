@@ -27,10 +27,7 @@ template <class V> KUZURE_INLINE Vec3<V> operator-(Vec3<V> a, Vec3<V> b) { retur
 template <class V> KUZURE_INLINE Vec3<V> operator*(V s, Vec3<V> a) { return {s * a.x, s * a.y, s * a.z}; }
 template <class V> KUZURE_INLINE V dot(Vec3<V> a, Vec3<V> b) { return fma(a.z, b.z, fma(a.y, b.y, a.x * b.x)); }
 /// a + s b
-template <class V> KUZURE_INLINE Vec3<V> fma(V s, Vec3<V> b, Vec3<V> a)
-{
-    return {fma(s, b.x, a.x), fma(s, b.y, a.y), fma(s, b.z, a.z)};
-}
+template <class V> KUZURE_INLINE Vec3<V> fma(V s, Vec3<V> b, Vec3<V> a) { return {fma(s, b.x, a.x), fma(s, b.y, a.y), fma(s, b.z, a.z)}; }
 inline double length(Vector a) { return sqrt(dot(a, a)); }
 
 template <class V> KUZURE_INLINE Sym3<V> operator+(Sym3<V> a, Sym3<V> b)
@@ -41,15 +38,11 @@ template <class V> KUZURE_INLINE Sym3<V> operator-(Sym3<V> a, Sym3<V> b)
 {
     return {a.xx - b.xx, a.yy - b.yy, a.zz - b.zz, a.xy - b.xy, a.yz - b.yz, a.xz - b.xz};
 }
-template <class V> KUZURE_INLINE Sym3<V> operator*(V s, Sym3<V> a)
-{
-    return {s * a.xx, s * a.yy, s * a.zz, s * a.xy, s * a.yz, s * a.xz};
-}
+template <class V> KUZURE_INLINE Sym3<V> operator*(V s, Sym3<V> a) { return {s * a.xx, s * a.yy, s * a.zz, s * a.xy, s * a.yz, s * a.xz}; }
 /// a + s b
 template <class V> KUZURE_INLINE Sym3<V> fma(V s, Sym3<V> b, Sym3<V> a)
 {
-    return {fma(s, b.xx, a.xx), fma(s, b.yy, a.yy), fma(s, b.zz, a.zz),
-            fma(s, b.xy, a.xy), fma(s, b.yz, a.yz), fma(s, b.xz, a.xz)};
+    return {fma(s, b.xx, a.xx), fma(s, b.yy, a.yy), fma(s, b.zz, a.zz), fma(s, b.xy, a.xy), fma(s, b.yz, a.yz), fma(s, b.xz, a.xz)};
 }
 template <class V> KUZURE_INLINE Vec3<V> operator*(Sym3<V> a, Vec3<V> b)
 {
@@ -58,15 +51,9 @@ template <class V> KUZURE_INLINE Vec3<V> operator*(Sym3<V> a, Vec3<V> b)
 }
 template <class V> KUZURE_INLINE V trace(Sym3<V> a) { return a.xx + a.yy + a.zz; }
 /// a + p 1
-template <class V> KUZURE_INLINE Sym3<V> plus_isotropic(Sym3<V> a, V p)
-{
-    return {a.xx + p, a.yy + p, a.zz + p, a.xy, a.yz, a.xz};
-}
+template <class V> KUZURE_INLINE Sym3<V> plus_isotropic(Sym3<V> a, V p) { return {a.xx + p, a.yy + p, a.zz + p, a.xy, a.yz, a.xz}; }
 /// s = a - tr(a)/3 1, in two and three dimensions alike.
-template <class V> KUZURE_INLINE Sym3<V> deviator(Sym3<V> a)
-{
-    return plus_isotropic(a, trace(a) * V(number<V>(-1.0 / 3)));
-}
+template <class V> KUZURE_INLINE Sym3<V> deviator(Sym3<V> a) { return plus_isotropic(a, trace(a) * V(number<V>(-1.0 / 3))); }
 /// a : b
 template <class V> KUZURE_INLINE V contract(Sym3<V> a, Sym3<V> b)
 {

@@ -1,6 +1,6 @@
+#include "solver/core/ensure.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/kernels/variants.hpp"
-#include "solver/core/ensure.hpp"
 
 namespace kuzure {
 

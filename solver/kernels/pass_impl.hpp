@@ -23,10 +23,7 @@ template <class V> using Update = std::conditional_t<width<V> == 1, double, Nati
 template <class V, bool Fixed = single<V>> struct Positions {
     Vec3<V> x;
     template <class T> KUZURE_INLINE Vec3<V> minus(const Record<T>& j) const { return {x.x - j.x, x.y - j.y, x.z - j.z}; }
-    KUZURE_INLINE Vec3<V> minus(Place<double> jx, Place<double> jy, Place<double> jz) const
-    {
-        return {x.x - jx, x.y - jy, x.z - jz};
-    }
+    KUZURE_INLINE Vec3<V> minus(Place<double> jx, Place<double> jy, Place<double> jz) const { return {x.x - jx, x.y - jy, x.z - jz}; }
 };
 template <class V> struct Positions<V, true> {
     static constexpr int W = width<V>;
@@ -61,10 +58,10 @@ template <class V> struct Here {
 
 /// Sums of one cluster, in double, ready for the update: rows of W lanes.
 template <int W, bool Tensile> struct alignas(64) Sums {
-    double grad_v[9][W];   // sum V_j (v_j - v_i) (x) shape r
-    double force[3][W];    // sum V_j (sigma_j - rho_i rho_j Pi) . shape r
-    double grad_one[3][W]; // sum V_j shape r
-    double power[W];       // sum V_j rho_i rho_j Pi approach shape
+    double grad_v[9][W];              // sum V_j (v_j - v_i) (x) shape r
+    double force[3][W];               // sum V_j (sigma_j - rho_i rho_j Pi) . shape r
+    double grad_one[3][W];            // sum V_j shape r
+    double power[W];                  // sum V_j rho_i rho_j Pi approach shape
     double close[Tensile ? 3 : 1][W]; // sum V_j f^n shape r
 };
 
@@ -138,7 +135,7 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
             n += hits != 0;
             pairs += std::popcount(hits);
         }
-        if constexpr (width<V> > 1)
+        if constexpr (width < V >> 1)
             while (n % 2) near[n++] = far_away;
 
         for (int b = 0; b < n; b += batch) {
@@ -199,8 +196,7 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
     store_wide(out.force[0], A.x), store_wide(out.force[1], A.y), store_wide(out.force[2], A.z);
     store_wide(out.grad_one[0], G.x), store_wide(out.grad_one[1], G.y), store_wide(out.grad_one[2], G.z);
     store_wide(out.power, power);
-    if constexpr (Model::tensile)
-        store_wide(out.close[0], F.x), store_wide(out.close[1], F.y), store_wide(out.close[2], F.z);
+    if constexpr (Model::tensile) store_wide(out.close[0], F.x), store_wide(out.close[1], F.y), store_wide(out.close[2], F.z);
     return pairs;
 }
 
@@ -242,8 +238,8 @@ inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, con
 /// 1997; Bui et al. 2008, eq. 45), the factor 1 + d_B/d_A capped at 1.5.
 template <class Model, class V, class T>
 [[gnu::noinline]] std::int64_t sum_over_walls(const Model& model, const Here<V>& i, const Pass<T>& pass, std::span<const Index> runs,
-                                              double unit, int dimensions, double scale,
-                                              Sums<width<V>, Model::tensile>& out, double* wall_power)
+                                              double unit, int dimensions, double scale, Sums<width<V>, Model::tensile>& out,
+                                              double* wall_power)
 {
     constexpr int W = width<V>;
     const auto& p = *pass.particles;
@@ -363,17 +359,19 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
         for (int k = 0; k < width<U>; ++k) {
             const Material& m = pass.soils[soil_of[at + std::min(k, n - 1)]];
             const auto e = Elastoplastic<double>::from(m);
-            const double row_of[9] = {e.shear, e.bulk, e.alpha, e.k, e.nine_k_alpha_psi, e.inverse_denominator, e.apex, m.sound_speed, m.density};
+            const double row_of[9] = {e.shear, e.bulk,        e.alpha,  e.k, e.nine_k_alpha_psi, e.inverse_denominator,
+                                      e.apex,  m.sound_speed, m.density};
             for (int q = 0; q < 9; ++q) table[q][k] = row_of[q];
         }
-        soil = {load<U>(table[0]), load<U>(table[1]), load<U>(table[2]), load<U>(table[3]), load<U>(table[4]), load<U>(table[5]), load<U>(table[6])};
+        soil = {load<U>(table[0]), load<U>(table[1]), load<U>(table[2]), load<U>(table[3]),
+                load<U>(table[4]), load<U>(table[5]), load<U>(table[6])};
         c = load<U>(table[7]), rho0 = load<U>(table[8]);
     }
 
     const Sym3<U> sigma = sp.template load<U>(at);
     const U rho = rp.template load<U>(at);
     const U inverse_rho = one / rho;
-    const auto sum = [&](const double (&rows)[W]) { return load<U>(rows + row); };
+    const auto sum = [&](const double(&rows)[W]) { return load<U>(rows + row); };
     const Mat3<U> L{{factor * sum(sums.grad_v[0]), factor * sum(sums.grad_v[1]), factor * sum(sums.grad_v[2])},
                     {factor * sum(sums.grad_v[3]), factor * sum(sums.grad_v[4]), factor * sum(sums.grad_v[5])},
                     {factor * sum(sums.grad_v[6]), factor * sum(sums.grad_v[7]), factor * sum(sums.grad_v[8])}};
@@ -404,8 +402,8 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     // ---- half-step values: one whole kick. The stress rotates with the material, then the strain loads it.
     const Vec3<U> v_h = fma(kick, a, vh.template load<U>(at));
     const U rho_h = fma(kick, rho_rate, rh.template load<U>(at));
-    const Sym3<U> turned = rotate(spin_increment(L, kick), sh.template load<U>(at));
-    const auto mapped = return_to_cone(turned + hooke(kick * D, soil), soil);
+    const Sym3<U> loading = half * hooke(kick * D, soil); // half before the turn and half after: second order in time
+    const auto mapped = return_to_cone(rotate(spin_increment(L, kick), sh.template load<U>(at) + loading) + loading, soil);
 
     // ---- values at the end of the step: half a step on from there
     const Vec3<U> x = fma(dt, v_h, xx.template load<U>(at));
@@ -426,7 +424,8 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
 
     // ---- records for the next step's pairs
     double rows[14][width<U>];
-    const U columns[14] = {x.x, x.y, x.z, v_end.x, v_end.y, v_end.z, volume_end, rho_end, s_end.xx, s_end.yy, s_end.zz, s_end.xy, s_end.yz, s_end.xz};
+    const U columns[14] = {x.x,     x.y,      x.z,      v_end.x,  v_end.y,  v_end.z,  volume_end,
+                           rho_end, s_end.xx, s_end.yy, s_end.zz, s_end.xy, s_end.yz, s_end.xz};
     for (int k = 0; k < 14; ++k) store(rows[k], columns[k]);
     for (int k = 0; k < n; ++k) {
         Record<T>& r = pass.next[at + k];
@@ -437,8 +436,8 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
         r.xy = T(rows[11][k]), r.yz = T(rows[12][k]), r.xz = T(rows[13][k]);
         r.sound_speed = T(lane(c, k)), r.spare = T(0);
         if constexpr (Model::tensile)
-            pass.next_tension[at + k] = make_tension<T>(
-                Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]}, model.artificial_stress.epsilon);
+            pass.next_tension[at + k] = make_tension<T>(Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]},
+                                                        model.artificial_stress.epsilon);
     }
 
     // ---- energy: exact sums of rounded addends; extremes; both over the first n lanes
@@ -480,10 +479,14 @@ inline void merge(PassResult& a, const PassResult& b)
     a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
     a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
     a.pairs += b.pairs;
-    auto &x = a.extremes;
-    const auto &y = b.extremes;
-    x = {max(y.acceleration2, x.acceleration2), max(y.signal, x.signal), max(y.moved2, x.moved2),
-         max(y.speed2, x.speed2), max(y.bad, x.bad), max(y.outside, x.outside)};
+    auto& x = a.extremes;
+    const auto& y = b.extremes;
+    x = {max(y.acceleration2, x.acceleration2),
+         max(y.signal, x.signal),
+         max(y.moved2, x.moved2),
+         max(y.speed2, x.speed2),
+         max(y.bad, x.bad),
+         max(y.outside, x.outside)};
 }
 
 } // namespace pass
@@ -565,8 +568,7 @@ private:
         const auto walls = p.lists->walls(cluster);
         if (!walls.empty()) total.pairs += pass::sum_over_walls(model_, i, p, walls, unit_, dimensions_, scale_, sums, wall_power);
         for (int row = 0; row < i.count; row += width<U>)
-            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, place_,
-                             total);
+            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, place_, total);
     }
 
     double unit_;

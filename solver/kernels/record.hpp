@@ -23,7 +23,7 @@ static_assert(sizeof(Record<double>) == 128 && sizeof(Record<float>) == 64);
 
 /// Turns metres into Place<T> and back; the same arithmetic wherever a record is made.
 template <class T> struct Places {
-    double unit;    // m
+    double unit; // m
     double per_unit;
     explicit Places(double h) : unit(std::is_same_v<T, double> ? 1.0 : h / 1048576), per_unit(1 / unit) {}
     Place<T> operator()(double x) const

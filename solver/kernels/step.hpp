@@ -56,10 +56,10 @@ template <class T> struct Pass {
     const ClusterLists* lists;
     std::span<const WallRecords<T>> walls;
     std::span<const Material> soils;
-    double volume;  // m^3 (m^2 in 2-D) of one particle at reference density
-    double h;       // m
-    double dt;      // length of this step, s
-    double kick;    // half of the step before and half of this one, s
+    double volume; // m^3 (m^2 in 2-D) of one particle at reference density
+    double h;      // m
+    double dt;     // length of this step, s
+    double kick;   // half of the step before and half of this one, s
     StepForces forces;
     double energy_unit; // J
     std::optional<Vector> low, high;

@@ -6,12 +6,9 @@
 
 namespace kuzure {
 
-using Variants = std::tuple<Model<CubicSpline, NoViscosity, NoArtificialStress>,
-                            Model<CubicSpline, LinearViscosity, NoArtificialStress>,
-                            Model<WendlandC2, LinearViscosity, NoArtificialStress>,
-                            Model<CubicSpline, Viscosity, ArtificialStress>,
-                            Model<WendlandC2, Viscosity, ArtificialStress>,
-                            Model<WendlandC4, Viscosity, ArtificialStress>>;
+using Variants = std::tuple<Model<CubicSpline, NoViscosity, NoArtificialStress>, Model<CubicSpline, LinearViscosity, NoArtificialStress>,
+                            Model<WendlandC2, LinearViscosity, NoArtificialStress>, Model<CubicSpline, Viscosity, ArtificialStress>,
+                            Model<WendlandC2, Viscosity, ArtificialStress>, Model<WendlandC4, Viscosity, ArtificialStress>>;
 
 inline constexpr int KUZURE_VARIANTS = 6; // read by CMakeLists.txt and Makefile.knl
 static_assert(std::tuple_size_v<Variants> == KUZURE_VARIANTS);

@@ -50,8 +50,7 @@ void sort_heights(Height* begin, Height* end)
 
 } // namespace
 
-ColumnSort sort_into_columns(const Columns& columns, const double* x, const double* y, const double* z,
-                             const std::int64_t* id, Index n)
+ColumnSort sort_into_columns(const Columns& columns, const double* x, const double* y, const double* z, const std::int64_t* id, Index n)
 {
     ColumnSort s;
     s.order.resize(n);

@@ -39,7 +39,6 @@ struct ColumnSort {
 };
 
 /// Sorts points (x, y, z, id) of any number. Throws NumbersFailed if they spread over more columns than memory allows.
-ColumnSort sort_into_columns(const Columns&, const double* x, const double* y, const double* z, const std::int64_t* id,
-                             Index n);
+ColumnSort sort_into_columns(const Columns&, const double* x, const double* y, const double* z, const std::int64_t* id, Index n);
 
 } // namespace kuzure

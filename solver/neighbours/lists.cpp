@@ -74,8 +74,7 @@ Candidates merge(const SortedPoints& a, const SortedPoints& b, Vector origin)
         auto [i, i_end] = ca.range(cx, cy);
         auto [j, j_end] = cb.range(cx, cy);
         for (Index at = m.start[c]; at < m.start[c + 1]; ++at) {
-            const bool first = j == j_end ||
-                               (i < i_end && (a.z[i] < b.z[j] || (a.z[i] == b.z[j] && a.id[i] < b.id[j])));
+            const bool first = j == j_end || (i < i_end && (a.z[i] < b.z[j] || (a.z[i] == b.z[j] && a.id[i] < b.id[j])));
             if (first) put(at, a, i, i), ++i;
             else put(at, b, j, a.n + j), ++j;
         }
@@ -122,8 +121,7 @@ std::size_t find(const Candidates& m, const Columns& columns, const Cluster& c, 
             const float dx = std::max({0.f, left - c.hi[0], c.lo[0] - right});
             float dy = 0;
             if (!columns.flat) {
-                const float front = float(columns.origin.y + cy * columns.width_y - origin.y),
-                            back = front + float(columns.width_y);
+                const float front = float(columns.origin.y + cy * columns.width_y - origin.y), back = front + float(columns.width_y);
                 dy = std::max({0.f, front - c.hi[1], c.lo[1] - back});
             }
             // left and front carry single-precision rounding: reach has the slack for it
@@ -152,8 +150,8 @@ std::size_t find(const Candidates& m, const Columns& columns, const Cluster& c, 
 
 } // namespace
 
-void ClusterLists::build(const Columns& columns, const SortedPoints& owned, const SortedPoints& ghosts,
-                         std::span<const WallPoints> walls, double reach, int width)
+void ClusterLists::build(const Columns& columns, const SortedPoints& owned, const SortedPoints& ghosts, std::span<const WallPoints> walls,
+                         double reach, int width)
 {
     ensure(width >= 1 && width <= 16, "a cluster holds 1 to 16 particles");
     width_ = width;
@@ -228,8 +226,8 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
                 for (std::size_t w = 0; w < walls.size(); ++w) {
                     if (wall_out.size() < wall_used + 2) grower(wall_out)(wall_used + 2);
                     const std::size_t head = wall_used;
-                    wall_used = find(wall_points[w], columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach,
-                                     wall_out, wall_used + 2, grower(wall_out));
+                    wall_used = find(wall_points[w], columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach, wall_out,
+                                     wall_used + 2, grower(wall_out));
                     const std::size_t found = wall_used - head - 2;
                     if (found == 0) {
                         wall_used = head;

@@ -27,8 +27,8 @@ struct WallPoints {
 class ClusterLists {
 public:
     /// Lists of all pairs closer than reach between owned soil and soil or walls; clusters of `width` particles.
-    void build(const Columns&, const SortedPoints& owned, const SortedPoints& ghosts, std::span<const WallPoints> walls,
-               double reach, int width);
+    void build(const Columns&, const SortedPoints& owned, const SortedPoints& ghosts, std::span<const WallPoints> walls, double reach,
+               int width);
 
     Index size() const { return Index(first_.size()); }
     int width() const { return width_; }

@@ -10,16 +10,21 @@ namespace kuzure {
 
 /// What the constitutive law needs of a soil, one number or one lane of numbers each.
 template <class V> struct Elastoplastic {
-    V shear, bulk;           // Pa
-    V alpha, k;              // cone: sqrt(J2) + alpha I1 <= k
-    V nine_k_alpha_psi;      // 9 K alpha_psi: fall of I1 per unit of plastic multiplier
-    V inverse_denominator;   // 1/(G + 9 K alpha alpha_psi)
-    V apex;                  // largest I1 that the soil bears, Pa
+    V shear, bulk;         // Pa
+    V alpha, k;            // cone: sqrt(J2) + alpha I1 <= k
+    V nine_k_alpha_psi;    // 9 K alpha_psi: fall of I1 per unit of plastic multiplier
+    V inverse_denominator; // 1/(G + 9 K alpha alpha_psi)
+    V apex;                // largest I1 that the soil bears, Pa
     static Elastoplastic from(const Material& m)
     {
         using T = number<V>;
-        return {V(T(m.shear)), V(T(m.bulk)), V(T(m.alpha)), V(T(m.k)), V(T(9 * m.bulk * m.alpha_psi)),
-                V(T(1 / (m.shear + 9 * m.bulk * m.alpha * m.alpha_psi))), V(T(m.apex))};
+        return {V(T(m.shear)),
+                V(T(m.bulk)),
+                V(T(m.alpha)),
+                V(T(m.k)),
+                V(T(9 * m.bulk * m.alpha_psi)),
+                V(T(1 / (m.shear + 9 * m.bulk * m.alpha * m.alpha_psi))),
+                V(T(m.apex))};
     }
 };
 

@@ -21,10 +21,7 @@ template <class V> struct Pair {
 /// Artificial viscosity rho_i rho_j Pi_ij of approaching pairs, linear part only (beta = 0). Monaghan (1992), eq. 4.8.
 struct LinearViscosity {
     double alpha, h;
-    static LinearViscosity from(const Scene& s, double h)
-    {
-        return {s.effects.viscosity.value_or(scene::Viscosity{0, 0}).alpha, h};
-    }
+    static LinearViscosity from(const Scene& s, double h) { return {s.effects.viscosity.value_or(scene::Viscosity{0, 0}).alpha, h}; }
     static bool covers(const scene::Effects& e) { return !e.viscosity || e.viscosity->beta == 0; }
 
     // mu = h approach/(r^2 + 0.01 h^2),  Pi = alpha c_ij mu/rho_ij,  rho_ij = (rho_i + rho_j)/2,  c_ij = (c_i + c_j)/2

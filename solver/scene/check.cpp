@@ -5,16 +5,13 @@
 #include <fmt/format.h>
 #include <numbers>
 
-namespace kuzure::scene
-{
-namespace
-{
+namespace kuzure::scene {
+namespace {
 
 double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 const char* name_of(Cone cone)
 {
-    static constexpr const char* names[] = {"compression", "extension", "plane strain",
-                                            "plane strain, no dilation"};
+    static constexpr const char* names[] = {"compression", "extension", "plane strain", "plane strain, no dilation"};
     return names[int(cone)];
 }
 
@@ -23,8 +20,7 @@ double widest_angle_without_tension(Cone cone)
 {
     const double limit = Material::widest_cone_without_tension();
     double low = 0, high = std::numbers::pi / 2;
-    if (Material::slope(cone, high * (1 - 1e-12)) <= limit)
-        return high;
+    if (Material::slope(cone, high * (1 - 1e-12)) <= limit) return high;
     while (high - low > 1e-12) {
         const double middle = 0.5 * (low + high);
         (Material::slope(cone, middle) <= limit ? low : high) = middle;
@@ -36,14 +32,11 @@ double widest_angle_without_tension(Cone cone)
 std::string tension_in(const Soil& soil)
 {
     const Material m = Material::from(soil);
-    if (soil.cohesion > 0)
-        return fmt::format("soil {} has cohesion: c = {:.6g} Pa", soil.name, soil.cohesion);
+    if (soil.cohesion > 0) return fmt::format("soil {} has cohesion: c = {:.6g} Pa", soil.name, soil.cohesion);
     // The common limit of all cones, with room for the rounding of the angle.
     if (m.alpha > Material::widest_cone_without_tension() * (1 + 1e-12))
-        return fmt::format(
-            "soil {} has phi = {:.4g} deg > {:.1f} deg, where the {} cone reaches tensile principal stress",
-            soil.name, degrees(soil.friction_angle), degrees(widest_angle_without_tension(soil.cone)),
-            name_of(soil.cone));
+        return fmt::format("soil {} has phi = {:.4g} deg > {:.1f} deg, where the {} cone reaches tensile principal stress", soil.name,
+                           degrees(soil.friction_angle), degrees(widest_angle_without_tension(soil.cone)), name_of(soil.cone));
     return {};
 }
 std::string why_no_tension(const Scene& scene)
@@ -55,10 +48,8 @@ std::string why_no_tension(const Scene& scene)
         cohesion = cohesion || soil.cohesion > 0;
     }
     const std::string strength = cohesion ? "no tension beyond the cut-off" : "c = 0";
-    if (least > 1.57)
-        return strength + ": no tensile principal stress can exist inside the cone at any phi";
-    return fmt::format("{} and phi < {:.1f} deg: no tensile principal stress can exist", strength,
-                       degrees(least));
+    if (least > 1.57) return strength + ": no tensile principal stress can exist inside the cone at any phi";
+    return fmt::format("{} and phi < {:.1f} deg: no tensile principal stress can exist", strength, degrees(least));
 }
 
 template <class... Args> std::string text(fmt::format_string<Args...> pattern, Args&&... args)
@@ -86,15 +77,12 @@ void check_soils(const Scene& scene, Rules& rules)
         const std::string key = "soil." + soil.name;
         const Material m = Material::from(soil);
         if (soil.cohesion == 0 && soil.friction_angle == 0)
-            rules.error(
-                key,
-                "expected a soil with strength, found cohesion and friction_angle both 0; give one of them");
+            rules.error(key, "expected a soil with strength, found cohesion and friction_angle both 0; give one of them");
         if (soil.dilation_angle > soil.friction_angle)
-            rules.error(key + ".dilation_angle",
-                        text("expected at most the friction angle, found {:.6g} deg > {:.6g} deg; with more, "
-                             "plastic flow "
-                             "would create energy",
-                             degrees(soil.dilation_angle), degrees(soil.friction_angle)));
+            rules.error(key + ".dilation_angle", text("expected at most the friction angle, found {:.6g} deg > {:.6g} deg; with more, "
+                                                      "plastic flow "
+                                                      "would create energy",
+                                                      degrees(soil.dilation_angle), degrees(soil.friction_angle)));
         else if (soil.dilation_angle > 0)
             rules.warning(key + ".dilation_angle", "a constant dilation angle lets sheared soil swell "
                                                    "without end: read long run-outs with care");
@@ -104,21 +92,17 @@ void check_soils(const Scene& scene, Rules& rules)
                                                       "it out",
                                                       m.k / m.alpha / 3, *soil.tension_cutoff));
         if (m.alpha == 0 && !soil.tension_cutoff)
-            rules.warning(key,
-                          "without friction the cone has no apex, so the soil bears any mean tension; give a "
-                          "tension_cutoff if it should not");
+            rules.warning(key, "without friction the cone has no apex, so the soil bears any mean tension; give a "
+                               "tension_cutoff if it should not");
         if (soil.cone == Cone::Compression && scene.dimensions == 2 && m.alpha > 0) {
             const double s = 3 * m.alpha;
-            rules.warning(
-                key + ".cone",
-                s < 1 ? text("in plane strain the compression cone acts like a friction angle of {:.1f} deg "
-                             "instead of {:.4g}; the plane strain cones do not",
-                             degrees(std::asin(s)), degrees(soil.friction_angle))
-                      : "in plane strain the compression cone has no limit at this friction angle; the plane "
-                        "strain cones have");
+            rules.warning(key + ".cone", s < 1 ? text("in plane strain the compression cone acts like a friction angle of {:.1f} deg "
+                                                      "instead of {:.4g}; the plane strain cones do not",
+                                                      degrees(std::asin(s)), degrees(soil.friction_angle))
+                                               : "in plane strain the compression cone has no limit at this friction angle; the plane "
+                                                 "strain cones have");
         }
-        if (std::none_of(scene.bodies.begin(), scene.bodies.end(),
-                         [&](const Body& b) { return b.soil == int(i); }))
+        if (std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) { return b.soil == int(i); }))
             rules.warning(key, "no body is made of this soil");
     }
 }
@@ -127,30 +111,22 @@ void check_shape(const Scene& scene, const Shape& shape, const std::string& key,
 {
     const bool flat = scene.dimensions == 2;
     if (flat && std::holds_alternative<Cylinder>(shape))
-        rules.error(
-            key + ".cylinder",
-            "expected a box, sphere (a disc) or polygon in 2-D, found a cylinder; use dimensions = 3");
+        rules.error(key + ".cylinder", "expected a box, sphere (a disc) or polygon in 2-D, found a cylinder; use dimensions = 3");
     if (const auto* p = std::get_if<Polygon>(&shape)) {
         const std::size_t most_corners = 10000;
-        if (p->points.size() < 3)
-            rules.error(key + ".polygon.points",
-                        text("expected at least 3 corners, found {}", p->points.size()));
+        if (p->points.size() < 3) rules.error(key + ".polygon.points", text("expected at least 3 corners, found {}", p->points.size()));
         else if (p->points.size() > most_corners)
-            rules.error(key + ".polygon.points", text("expected at most {} corners, found {}; leave out some",
-                                                      most_corners, p->points.size()));
-        else if (crosses_itself(*p))
             rules.error(key + ".polygon.points",
-                        "expected a polygon whose edges meet at their corners only, found one that crosses "
-                        "or repeats "
-                        "itself; name the corners in order, the first not again at the end");
+                        text("expected at most {} corners, found {}; leave out some", most_corners, p->points.size()));
+        else if (crosses_itself(*p))
+            rules.error(key + ".polygon.points", "expected a polygon whose edges meet at their corners only, found one that crosses "
+                                                 "or repeats "
+                                                 "itself; name the corners in order, the first not again at the end");
         if (!flat && !(p->y[0] < p->y[1]))
-            rules.error(
-                key + ".polygon.y",
-                p->y[0] == 0 && p->y[1] == 0
-                    ? std::string(
-                          "expected y = [from, to] in 3-D, found none; give the polygon's extent along y")
-                    : text("expected y = [from, to] with from < to, found [{}, {}]; exchange them", p->y[0],
-                           p->y[1]));
+            rules.error(key + ".polygon.y",
+                        p->y[0] == 0 && p->y[1] == 0
+                            ? std::string("expected y = [from, to] in 3-D, found none; give the polygon's extent along y")
+                            : text("expected y = [from, to] with from < to, found [{}, {}]; exchange them", p->y[0], p->y[1]));
     }
 }
 
@@ -163,69 +139,57 @@ void check_space(const Scene& scene, Rules& rules)
     if (space.low.has_value() != space.high.has_value())
         rules.error(
             space.low ? "space.low" : "space.high",
-            text("expected space.low and space.high together, found only space.{}; give both or neither",
-                 space.low ? "low" : "high"));
+            text("expected space.low and space.high together, found only space.{}; give both or neither", space.low ? "low" : "high"));
     if (space.low && space.high)
         for (int axis = 0; axis < 3; ++axis)
             if (!(flat && axis == 1) && !(at(*space.low, axis) < at(*space.high, axis)))
-                rules.error("space.high",
-                            text("expected high above low along {}, found {} and {}; exchange them",
-                                 names[axis], at(*space.low, axis), at(*space.high, axis)));
+                rules.error("space.high", text("expected high above low along {}, found {} and {}; exchange them", names[axis],
+                                               at(*space.low, axis), at(*space.high, axis)));
     if (flat && space.periodic[1])
-        rules.error("space.periodic",
-                    "expected no periodic y in 2-D, which has no y; leave it out or use dimensions = 3");
+        rules.error("space.periodic", "expected no periodic y in 2-D, which has no y; leave it out or use dimensions = 3");
     for (int axis = 0; axis < 3; ++axis) {
-        if (!space.periodic[std::size_t(axis)] || (flat && axis == 1))
-            continue;
+        if (!space.periodic[std::size_t(axis)] || (flat && axis == 1)) continue;
         if (!space.low || !space.high) {
-            rules.error("space.periodic",
-                        text("expected space.low and space.high with periodic {}, found none; their "
-                             "distance is the period",
-                             names[axis]));
+            rules.error("space.periodic", text("expected space.low and space.high with periodic {}, found none; their "
+                                               "distance is the period",
+                                               names[axis]));
             continue;
         }
         const double period = at(*space.high, axis) - at(*space.low, axis), n = period / space.spacing;
         const double least = 2 * scene.support() * (1 + scene.accuracy.skin);
-        if (!(period > 0))
-            continue;
+        if (!(period > 0)) continue;
         if (std::abs(n - std::round(n)) > 1e-6)
-            rules.error("space.periodic",
-                        text("expected a period of whole spacings along {}, found {:.9g} spacings of {} m; "
-                             "change space.high",
-                             names[axis], n, space.spacing));
+            rules.error("space.periodic", text("expected a period of whole spacings along {}, found {:.9g} spacings of {} m; "
+                                               "change space.high",
+                                               names[axis], n, space.spacing));
         if (period < least)
-            rules.error("space.periodic",
-                        text("expected a period of at least {:.6g} m along {} (two supports and skin, so "
-                             "that no particle meets itself), found {:.6g} m; widen it",
-                             least, names[axis], period));
+            rules.error("space.periodic", text("expected a period of at least {:.6g} m along {} (two supports and skin, so "
+                                               "that no particle meets itself), found {:.6g} m; widen it",
+                                               least, names[axis], period));
     }
     if (scene.accuracy.kernel == Kernel::CubicSpline && space.h > 1.5)
-        rules.warning("space.h",
-                      text("the cubic spline lets particles pair up above h = 1.5 spacings, found {}; the "
-                           "wendland kernels do not",
-                           space.h));
+        rules.warning("space.h", text("the cubic spline lets particles pair up above h = 1.5 spacings, found {}; the "
+                                      "wendland kernels do not",
+                                      space.h));
 }
 
 void check_bodies(const Scene& scene, Rules& rules)
 {
     const bool flat = scene.dimensions == 2;
-    if (scene.bodies.empty())
-        rules.error("body", "expected at least one [[body]], found none");
+    if (scene.bodies.empty()) rules.error("body", "expected at least one [[body]], found none");
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const Body& body = scene.bodies[b];
         const std::string key = text("body.{}", b);
         check_shape(scene, body.shape, key, rules);
         if (flat && body.velocity.y != 0)
-            rules.error(key + ".velocity",
-                        text("expected no velocity along y in 2-D, found {}; set it to 0", body.velocity.y));
+            rules.error(key + ".velocity", text("expected no velocity along y in 2-D, found {}; set it to 0", body.velocity.y));
         if (body.stress == InitialStress::AtRest) {
             const auto& g = scene.effects.gravity;
             if (!g || !(g->z < 0) || g->x != 0 || g->y != 0)
-                rules.error(key + ".stress",
-                            text("expected gravity along -z for a stress \"at rest\", found {}; let "
-                                 "effects.gravity be "
-                                 "[0, 0, -9.81] or the stress \"none\"",
-                                 g ? text("[{}, {}, {}]", g->x, g->y, g->z) : std::string("none")));
+                rules.error(key + ".stress", text("expected gravity along -z for a stress \"at rest\", found {}; let "
+                                                  "effects.gravity be "
+                                                  "[0, 0, -9.81] or the stress \"none\"",
+                                                  g ? text("[{}, {}, {}]", g->x, g->y, g->z) : std::string("none")));
         }
     }
     for (std::size_t w = 0; w < scene.walls.size(); ++w) {
@@ -234,8 +198,7 @@ void check_bodies(const Scene& scene, Rules& rules)
         check_shape(scene, shape, key, rules);
         const Box box = bounds(shape);
         double thickness = std::min(box.high.x - box.low.x, box.high.z - box.low.z);
-        if (!flat)
-            thickness = std::min(thickness, box.high.y - box.low.y);
+        if (!flat) thickness = std::min(thickness, box.high.y - box.low.y);
         if (thickness < scene.support() * (1 - 1e-9))
             rules.warning(key, text("the wall is {:.6g} m thick, thinner than the support of {:.6g} m: soil "
                                     "at its face feels "
@@ -248,16 +211,13 @@ void check_effects(const Scene& scene, Rules& rules)
 {
     const Effects& effects = scene.effects;
     if (scene.dimensions == 2 && effects.gravity && effects.gravity->y != 0)
-        rules.error("effects.gravity",
-                    text("expected no gravity along y in 2-D, found {}; set it to 0", effects.gravity->y));
+        rules.error("effects.gravity", text("expected no gravity along y in 2-D, found {}; set it to 0", effects.gravity->y));
     if (effects.damping && effects.damping->until > scene.time.end)
-        rules.warning("effects.damping.until", text("damping lasts beyond the end of the run ({} s > {} s)",
-                                                    effects.damping->until, scene.time.end));
+        rules.warning("effects.damping.until",
+                      text("damping lasts beyond the end of the run ({} s > {} s)", effects.damping->until, scene.time.end));
     if (effects.artificial_stress && effects.artificial_stress_decision == Decision::AsWritten &&
-        std::all_of(scene.soils.begin(), scene.soils.end(),
-                    [](const Soil& s) { return tension_in(s).empty(); }))
-        rules.warning("effects.artificial_stress",
-                      "it is asked for and costs time, but " + why_no_tension(scene));
+        std::all_of(scene.soils.begin(), scene.soils.end(), [](const Soil& s) { return tension_in(s).empty(); }))
+        rules.warning("effects.artificial_stress", "it is asked for and costs time, but " + why_no_tension(scene));
 }
 
 void check_time(const Scene& scene, StepLimit limit, Rules& rules)
@@ -265,49 +225,40 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
     const auto severity = limit == StepLimit::Enforce ? Severity::Error : Severity::Warning;
     if (const auto step = scene.time.step) {
         if (std::round(scene.time.end / *step) < 1)
-            rules.error("time.step", text("expected a step of at most time.end = {} s, found {} s",
-                                          scene.time.end, *step));
+            rules.error("time.step", text("expected a step of at most time.end = {} s, found {} s", scene.time.end, *step));
         else if (scene.time.end / *step > 1e12)
-            rules.error("time.step",
-                        text("expected fewer than 1e12 steps, found {:.3g}; is the step in seconds?",
-                             scene.time.end / *step));
+            rules.error("time.step", text("expected fewer than 1e12 steps, found {:.3g}; is the step in seconds?", scene.time.end / *step));
         if (*step > stable_step(scene))
-            rules.issues.push_back(
-                {severity,
-                 "time.step",
-                 text("expected a step below the stable limit {:.4g} s ({} h/c_p), found {:.4g} s; use "
-                      "{:.4g} s or less, or leave the key out",
-                      stable_step(scene), unstable_courant, *step, recommended_step(scene)),
-                 {}});
+            rules.issues.push_back({severity,
+                                    "time.step",
+                                    text("expected a step below the stable limit {:.4g} s ({} h/c_p), found {:.4g} s; use "
+                                         "{:.4g} s or less, or leave the key out",
+                                         stable_step(scene), unstable_courant, *step, recommended_step(scene)),
+                                    {}});
         else if (*step > recommended_step(scene))
-            rules.warning("time.step",
-                          text("the step {:.4g} s is stable but above the recommended {:.4g} s ({} h/c_p)",
-                               *step, recommended_step(scene), recommended_courant));
+            rules.warning("time.step", text("the step {:.4g} s is stable but above the recommended {:.4g} s ({} h/c_p)", *step,
+                                            recommended_step(scene), recommended_courant));
     } else if (scene.accuracy.cfl > unstable_courant) {
         rules.issues.push_back({severity,
                                 "accuracy.cfl",
-                                text("expected a number below the stable limit {}, found {}; use {} or less",
-                                     unstable_courant, scene.accuracy.cfl, recommended_courant),
+                                text("expected a number below the stable limit {}, found {}; use {} or less", unstable_courant,
+                                     scene.accuracy.cfl, recommended_courant),
                                 {}});
     } else if (scene.accuracy.cfl > recommended_courant) {
-        rules.warning("accuracy.cfl", text("{} is stable but above the recommended {}", scene.accuracy.cfl,
-                                           recommended_courant));
+        rules.warning("accuracy.cfl", text("{} is stable but above the recommended {}", scene.accuracy.cfl, recommended_courant));
     }
 }
 
 void check_inside(const Scene& scene, Rules& rules)
 {
     const Space& space = scene.space;
-    if (!space.low || !space.high)
-        return;
+    if (!space.low || !space.high) return;
     const auto at = [](const Vector& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
     const auto outside = [&](const Shape& shape, const std::string& key, bool only_periodic) {
         const Box box = bounds(shape);
         for (int axis = 0; axis < 3; ++axis) {
-            if ((axis == 1 && scene.dimensions == 2) || (only_periodic && !space.periodic[std::size_t(axis)]))
-                continue;
-            const double low = at(*space.low, axis), high = at(*space.high, axis),
-                         slack = 1e-6 * space.spacing;
+            if ((axis == 1 && scene.dimensions == 2) || (only_periodic && !space.periodic[std::size_t(axis)])) continue;
+            const double low = at(*space.low, axis), high = at(*space.high, axis), slack = 1e-6 * space.spacing;
             if (at(box.low, axis) < low - slack || at(box.high, axis) > high + slack)
                 return rules.error(key,
                                    text("expected it inside space.low .. space.high = {:.6g} .. {:.6g} m "
@@ -328,8 +279,7 @@ void check_inside(const Scene& scene, Rules& rules)
 double crossing_time(const Scene& scene)
 {
     double least = std::numeric_limits<double>::infinity();
-    for (const auto& soil : scene.soils)
-        least = std::min(least, scene.smoothing_length() / Material::from(soil).sound_speed);
+    for (const auto& soil : scene.soils) least = std::min(least, scene.smoothing_length() / Material::from(soil).sound_speed);
     return least;
 }
 double recommended_step(const Scene& scene) { return recommended_courant * crossing_time(scene); }
@@ -339,75 +289,57 @@ void resolve(Scene& scene)
 {
     auto& notes = scene.notes;
     notes.clear();
-    const auto note = [&](const char* name, bool on, std::string why) {
-        notes.push_back({name, std::move(why), on});
-    };
+    const auto note = [&](const char* name, bool on, std::string why) { notes.push_back({name, std::move(why), on}); };
     Effects& effects = scene.effects;
     const std::string unwritten = "not in the scene";
 
-    if (const auto& g = effects.gravity)
-        note("gravity", true, text("[{:.6g}, {:.6g}, {:.6g}] m/s^2", g->x, g->y, g->z));
-    else
-        note("gravity", false, unwritten);
+    if (const auto& g = effects.gravity) note("gravity", true, text("[{:.6g}, {:.6g}, {:.6g}] m/s^2", g->x, g->y, g->z));
+    else note("gravity", false, unwritten);
 
     if (const auto& v = effects.viscosity)
-        note("viscosity", true,
-             text("alpha = {:.6g}, beta = {:.6g} against c_p: damps shocks and zero-energy modes", v->alpha,
-                  v->beta));
-    else
-        note("viscosity", false, unwritten);
+        note("viscosity", true, text("alpha = {:.6g}, beta = {:.6g} against c_p: damps shocks and zero-energy modes", v->alpha, v->beta));
+    else note("viscosity", false, unwritten);
 
     std::string tension;
     for (const auto& soil : scene.soils)
-        if (tension.empty())
-            tension = tension_in(soil);
+        if (tension.empty()) tension = tension_in(soil);
     const bool automatic = effects.artificial_stress_decision == Decision::Auto;
     if (automatic) {
         effects.artificial_stress.reset();
-        if (!tension.empty())
-            effects.artificial_stress = ArtificialStress{};
+        if (!tension.empty()) effects.artificial_stress = ArtificialStress{};
     }
     if (const auto& a = effects.artificial_stress)
         note("artificial_stress", true,
              text("epsilon = {:.6g}, exponent = {:.6g}: {}", a->epsilon, a->exponent,
                   automatic ? tension + ", so tensile instability is possible" : "as written in the scene"));
-    else
-        note("artificial_stress", false, automatic ? why_no_tension(scene) : unwritten);
+    else note("artificial_stress", false, automatic ? why_no_tension(scene) : unwritten);
 
-    if (const auto& d = effects.damping)
-        note("damping", true, text("{:.6g} of critical until t = {:.6g} s", d->ratio, d->until));
-    else
-        note("damping", false, unwritten);
+    if (const auto& d = effects.damping) note("damping", true, text("{:.6g} of critical until t = {:.6g} s", d->ratio, d->until));
+    else note("damping", false, unwritten);
 
     const auto list_soils = [&](auto wanted) {
         std::string names;
         for (const auto& soil : scene.soils)
-            if (wanted(soil))
-                names += (names.empty() ? "" : ", ") + soil.name;
+            if (wanted(soil)) names += (names.empty() ? "" : ", ") + soil.name;
         return names;
     };
     const auto dilating = list_soils([](const Soil& s) { return s.dilation_angle > 0; });
-    note("dilation", !dilating.empty(),
-         dilating.empty() ? "psi = 0: plastic flow keeps the volume" : "psi > 0 in " + dilating);
+    note("dilation", !dilating.empty(), dilating.empty() ? "psi = 0: plastic flow keeps the volume" : "psi > 0 in " + dilating);
     const auto cut = list_soils([](const Soil& s) { return s.tension_cutoff.has_value(); });
-    note("tension_cutoff", !cut.empty(),
-         cut.empty() ? "mean tension is limited by the cone's apex only" : "written for " + cut);
+    note("tension_cutoff", !cut.empty(), cut.empty() ? "mean tension is limited by the cone's apex only" : "written for " + cut);
 
-    const auto resting = std::count_if(scene.bodies.begin(), scene.bodies.end(),
-                                       [](const Body& b) { return b.stress == InitialStress::AtRest; });
+    const auto resting =
+        std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.stress == InitialStress::AtRest; });
     note("stress_at_rest", resting > 0,
-         resting ? text("{} of {} bodies start with K0 stress under their own weight", resting,
-                        scene.bodies.size())
+         resting ? text("{} of {} bodies start with K0 stress under their own weight", resting, scene.bodies.size())
                  : "every body starts without stress: gravity acts suddenly");
 
     const auto walls_with = [&](Surface surface) {
-        return std::count_if(scene.walls.begin(), scene.walls.end(),
-                             [&](const Wall& w) { return w.surface == surface; });
+        return std::count_if(scene.walls.begin(), scene.walls.end(), [&](const Wall& w) { return w.surface == surface; });
     };
     const auto wall_note = [&](const char* name, Surface surface, const char* meaning) {
         const auto n = walls_with(surface);
-        note(name, n > 0,
-             n ? text("{} of {} walls: {}", n, scene.walls.size(), meaning) : "no such wall in the scene");
+        note(name, n > 0, n ? text("{} of {} walls: {}", n, scene.walls.size(), meaning) : "no such wall in the scene");
     };
     wall_note("rough_walls", Surface::Rough, "no slip");
     wall_note("smooth_walls", Surface::Smooth, "free slip");
@@ -415,8 +347,7 @@ void resolve(Scene& scene)
 
     std::string periodic;
     for (int axis = 0; axis < 3; ++axis)
-        if (scene.space.periodic[std::size_t(axis)])
-            periodic += (periodic.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
+        if (scene.space.periodic[std::size_t(axis)]) periodic += (periodic.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
     note("periodic", !periodic.empty(), periodic.empty() ? unwritten : "along " + periodic);
     note("mixed_precision", scene.accuracy.precision == Precision::Mixed,
          scene.accuracy.precision == Precision::Mixed ? "pair sums in single, state in double precision"
@@ -433,10 +364,8 @@ Issues check(const Scene& scene, StepLimit limit)
     check_time(scene, limit, rules);
     check_inside(scene, rules);
     // Filling asks for shapes that make sense.
-    if (std::none_of(rules.issues.begin(), rules.issues.end(),
-                     [](const Issue& i) { return i.severity == Severity::Error; }))
-        for (auto& issue : Filling::problems(scene))
-            rules.issues.push_back(std::move(issue));
+    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
+        for (auto& issue : Filling::problems(scene)) rules.issues.push_back(std::move(issue));
     return rules.issues;
 }
 

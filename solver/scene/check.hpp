@@ -5,8 +5,7 @@
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
 
-namespace kuzure::scene
-{
+namespace kuzure::scene {
 
 /// Largest dt c_p/h that the leap-frog survives; above it a run is refused unless the user insists.
 inline constexpr double unstable_courant = 0.8;

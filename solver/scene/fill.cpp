@@ -2,10 +2,8 @@
 #include "solver/core/ensure.hpp"
 #include <fmt/format.h>
 
-namespace kuzure::scene
-{
-namespace
-{
+namespace kuzure::scene {
+namespace {
 
 /// A box's side must hold whole spacings within this share of one; two boxes may overlap by as much.
 const double tolerance = 1e-6;
@@ -28,8 +26,7 @@ double common(const Box& a, const Box& b, int dimensions)
     double least = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis)
         if (axis != 1 || dimensions == 3)
-            least = std::min(least, std::min(at(a.high, axis), at(b.high, axis)) -
-                                        std::max(at(a.low, axis), at(b.low, axis)));
+            least = std::min(least, std::min(at(a.high, axis), at(b.high, axis)) - std::max(at(a.low, axis), at(b.low, axis)));
     return least;
 }
 
@@ -45,12 +42,9 @@ double depth_between_faces(const Shape& shape, double y, double z, int dimension
     const auto depth = [](double x, double low, double high) { return std::min(x - low, high - x); };
     const double none = std::numeric_limits<double>::infinity();
     if (const auto* b = std::get_if<Box>(&shape))
-        return std::min(depth(z, b->low.z, b->high.z),
-                        dimensions == 2 ? none : depth(y, b->low.y, b->high.y));
-    if (const auto* c = std::get_if<Cylinder>(&shape))
-        return depth(z, c->base.z, c->base.z + c->height);
-    if (const auto* p = std::get_if<Polygon>(&shape); p && dimensions == 3)
-        return depth(y, p->y[0], p->y[1]);
+        return std::min(depth(z, b->low.z, b->high.z), dimensions == 2 ? none : depth(y, b->low.y, b->high.y));
+    if (const auto* c = std::get_if<Cylinder>(&shape)) return depth(z, c->base.z, c->base.z + c->height);
+    if (const auto* p = std::get_if<Polygon>(&shape); p && dimensions == 3) return depth(y, p->y[0], p->y[1]);
     return none;
 }
 
@@ -61,10 +55,8 @@ std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, dou
     std::vector<Zone> zones;
     const auto round = [&](double centre, double across2, double radius) {
         const double inner = std::max(radius - margin, 0.0), outer = radius + margin;
-        if (across2 > outer * outer)
-            return;
-        const double from = std::sqrt(std::max(inner * inner - across2, 0.0)),
-                     to = std::sqrt(outer * outer - across2);
+        if (across2 > outer * outer) return;
+        const double from = std::sqrt(std::max(inner * inner - across2, 0.0)), to = std::sqrt(outer * outer - across2);
         zones = {{centre - to, centre - from}, {centre + from, centre + to}};
     };
     if (const auto* b = std::get_if<Box>(&shape)) {
@@ -79,12 +71,10 @@ std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, dou
         for (std::size_t k = 0; k < points.size(); ++k) {
             const auto [ax, az] = points[k];
             const auto [bx, bz] = points[(k + 1) % points.size()];
-            if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin)
-                continue;
+            if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin) continue;
             // The part of the edge within margin of the row's height.
             const auto x_at = [&](double height) {
-                return az == bz ? height < z ? ax : bx
-                                : ax + std::clamp((height - az) / (bz - az), 0.0, 1.0) * (bx - ax);
+                return az == bz ? height < z ? ax : bx : ax + std::clamp((height - az) / (bz - az), 0.0, 1.0) * (bx - ax);
             };
             const double x1 = x_at(z - margin), x2 = x_at(z + margin);
             zones.push_back({std::min(x1, x2) - margin, std::max(x1, x2) + margin});
@@ -102,21 +92,17 @@ template <class Zones, class Visit> void Lattice::for_each_run(Range r, const Zo
 {
     std::int64_t next = r.first;
     const auto stretch = [&](std::int64_t last) {
-        if (next <= last)
-            visit(next, last);
+        if (next <= last) visit(next, last);
         next = std::max(next, last + 1);
     };
     const auto index = [&](double x) {
-        return std::int64_t(std::clamp(std::floor((x - x_.origin) / spacing_ - 0.5), double(r.first) - 2,
-                                       double(r.last) + 2));
+        return std::int64_t(std::clamp(std::floor((x - x_.origin) / spacing_ - 0.5), double(r.first) - 2, double(r.last) + 2));
     };
     for (const auto& zone : zones) {
-        if (next > r.last)
-            return;
+        if (next > r.last) return;
         stretch(std::min(index(zone.from) - 1, r.last));
         const std::int64_t end = std::min(index(zone.to) + 2, r.last);
-        while (next <= end)
-            visit(next, next), ++next;
+        while (next <= end) visit(next, next), ++next;
     }
     stretch(r.last);
 }
@@ -126,12 +112,10 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
     const Box outer = scene::bounds(shape);
     double points = 1, rows = 1;
     for (int axis = 0; axis < 3; ++axis) {
-        if (axis == 1 && dimensions == 2)
-            continue;
+        if (axis == 1 && dimensions == 2) continue;
         const double low = at(outer.low, axis), high = at(outer.high, axis), n = (high - low) / spacing;
         const char name = "xyz"[axis];
-        if (!(high > low))
-            return fmt::format("expected low < high along {}, found {} and {}", name, low, high);
+        if (!(high > low)) return fmt::format("expected low < high along {}, found {} and {}", name, low, high);
         if (std::holds_alternative<Box>(shape) && std::abs(n - std::round(n)) > tolerance) {
             const double less = low + std::floor(n) * spacing, more = low + std::ceil(n) * spacing;
             return fmt::format("expected a whole number of spacings ({} m) a side, found {:.9g} along {}; "
@@ -139,50 +123,39 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
                                spacing, n, name, name, n > 1 ? fmt::format("{:.9g} or ", less) : "", more);
         }
         points *= n;
-        if (axis > 0)
-            rows *= n;
+        if (axis > 0) rows *= n;
     }
     if (points > most_points || (!std::holds_alternative<Box>(shape) && rows > most_rows))
-        return fmt::format(
-            "expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
-            "is space.spacing in metres?",
-            points, spacing);
+        return fmt::format("expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
+                           "is space.spacing in metres?",
+                           points, spacing);
     return {};
 }
 
-Lattice::Lattice(const Shape& shape, double spacing, int dimensions)
-    : dimensions_(dimensions), spacing_(spacing)
+Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimensions_(dimensions), spacing_(spacing)
 {
     ensure(problem(shape, spacing, dimensions).empty(), "a shape is filled that cannot be");
     const Box outer = scene::bounds(shape);
     if (std::holds_alternative<Box>(shape)) {
-        const auto side = [&](double low, double high) {
-            return Axis{low, {0, std::int64_t(std::llround((high - low) / spacing)) - 1}};
-        };
+        const auto side = [&](double low, double high) { return Axis{low, {0, std::int64_t(std::llround((high - low) / spacing)) - 1}}; };
         x_ = side(outer.low.x, outer.high.x), z_ = side(outer.low.z, outer.high.z);
-        if (dimensions == 3)
-            y_ = side(outer.low.y, outer.high.y);
+        if (dimensions == 3) y_ = side(outer.low.y, outer.high.y);
         row_start_ = {0, 1};
         intervals_ = {{0, x_.range.last, 0}};
         layer_id_ = {0, count(y_.range) * count(x_.range)};
     } else {
         const auto side = [&](double low, double high) {
-            return Axis{0,
-                        {std::int64_t(std::floor(low / spacing - 0.5)),
-                         std::int64_t(std::ceil(high / spacing - 0.5))}};
+            return Axis{0, {std::int64_t(std::floor(low / spacing - 0.5)), std::int64_t(std::ceil(high / spacing - 0.5))}};
         };
         x_ = side(outer.low.x, outer.high.x), z_ = side(outer.low.z, outer.high.z);
-        if (dimensions == 3)
-            y_ = side(outer.low.y, outer.high.y);
+        if (dimensions == 3) y_ = side(outer.low.y, outer.high.y);
         const auto inside = [&](std::int64_t kx, std::int64_t ky, std::int64_t kz) {
             const Vector x{coordinate(x_, kx), y_of(ky), coordinate(z_, kz)};
             return signed_distance(shape, x, dimensions) < -on_the_surface * spacing;
         };
         const auto trim = [&](Axis& axis, auto any) {
-            while (axis.range.first <= axis.range.last && !any(axis.range.first))
-                ++axis.range.first;
-            while (axis.range.first <= axis.range.last && !any(axis.range.last))
-                --axis.range.last;
+            while (axis.range.first <= axis.range.last && !any(axis.range.first)) ++axis.range.first;
+            while (axis.range.first <= axis.range.last && !any(axis.range.last)) --axis.range.last;
         };
         // Along the axis of extrusion the first and last layers may lie outside: cut them off, then rows
         // repeat.
@@ -202,30 +175,23 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions)
         } else {
             stride_z_ = count(y_.range), stride_y_ = 1;
         }
-        if (count(z_.range) <= 0 || count(y_.range) <= 0)
-            z_.range.last = z_.range.first - 1;
+        if (count(z_.range) <= 0 || count(y_.range) <= 0) z_.range.last = z_.range.first - 1;
 
-        const std::int64_t stored_z =
-            stride_z_ ? count(z_.range) : std::min<std::int64_t>(count(z_.range), 1);
+        const std::int64_t stored_z = stride_z_ ? count(z_.range) : std::min<std::int64_t>(count(z_.range), 1);
         const std::int64_t stored_y = stride_y_ ? count(y_.range) : 1;
         row_start_ = {0};
         layer_id_ = {0};
         for (std::int64_t iz = 0; iz < stored_z; ++iz) {
             std::int64_t in_layer = 0;
             for (std::int64_t iy = 0; iy < stored_y; ++iy) {
-                if (stride_y_)
-                    row_id_.push_back(in_layer);
+                if (stride_y_) row_id_.push_back(in_layer);
                 const std::int64_t kz = z_.range.first + iz, ky = y_.range.first + iy;
                 std::int64_t in_row = 0;
-                const auto zones =
-                    zones_near_surface(shape, y_of(ky), coordinate(z_, kz), tolerance * spacing, dimensions);
+                const auto zones = zones_near_surface(shape, y_of(ky), coordinate(z_, kz), tolerance * spacing, dimensions);
                 for_each_run(x_.range, zones, [&](std::int64_t first, std::int64_t last) {
-                    if (!inside(first, ky, kz))
-                        return;
-                    if (in_row > 0 && intervals_.back().last == first - 1)
-                        intervals_.back().last = last;
-                    else
-                        intervals_.push_back({first, last, in_row});
+                    if (!inside(first, ky, kz)) return;
+                    if (in_row > 0 && intervals_.back().last == first - 1) intervals_.back().last = last;
+                    else intervals_.push_back({first, last, in_row});
                     in_row += last - first + 1;
                 });
                 row_start_.push_back(intervals_.size());
@@ -236,18 +202,15 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions)
     }
     size_ = stride_z_ ? layer_id_.back() : count(z_.range) > 0 ? count(z_.range) * layer_id_[1] : 0;
 
-    if (size_ == 0)
-        return;
+    if (size_ == 0) return;
     const double far = std::numeric_limits<double>::infinity();
     bounds_ = {{far, far, far}, {-far, -far, -far}};
-    const std::int64_t stored_z = std::int64_t(layer_id_.size()) - 1,
-                       stored_y = stride_y_ ? count(y_.range) : 1;
+    const std::int64_t stored_z = std::int64_t(layer_id_.size()) - 1, stored_y = stride_y_ ? count(y_.range) : 1;
     for (std::int64_t iz = 0; iz < stored_z; ++iz)
         for (std::int64_t iy = 0; iy < stored_y; ++iy) {
             const std::int64_t kz = z_.range.first + iz, ky = y_.range.first + iy;
             const auto in = row(kz, ky).intervals;
-            if (in.empty())
-                continue;
+            if (in.empty()) continue;
             const std::int64_t top = stride_z_ ? kz : z_.range.last, back = stride_y_ ? ky : y_.range.last;
             bounds_ = united(bounds_, {{coordinate(x_, in.front().first), y_of(ky), coordinate(z_, kz)},
                                        {coordinate(x_, in.back().last), y_of(back), coordinate(z_, top)}});
@@ -260,14 +223,10 @@ Lattice::Range Lattice::within(const Axis& a, double low, double high) const
     const double first = double(a.range.first), last = double(a.range.last);
     Range r{std::int64_t(std::clamp(std::ceil((low - a.origin) / spacing_ - 0.5), first, last + 1)),
             std::int64_t(std::clamp(std::floor((high - a.origin) / spacing_ - 0.5), first - 1, last))};
-    while (r.first > a.range.first && coordinate(a, r.first - 1) >= low)
-        --r.first;
-    while (r.first <= a.range.last && coordinate(a, r.first) < low)
-        ++r.first;
-    while (r.last < a.range.last && coordinate(a, r.last + 1) <= high)
-        ++r.last;
-    while (r.last >= a.range.first && coordinate(a, r.last) > high)
-        --r.last;
+    while (r.first > a.range.first && coordinate(a, r.first - 1) >= low) --r.first;
+    while (r.first <= a.range.last && coordinate(a, r.first) < low) ++r.first;
+    while (r.last < a.range.last && coordinate(a, r.last + 1) <= high) ++r.last;
+    while (r.last >= a.range.first && coordinate(a, r.last) > high) --r.last;
     return r;
 }
 
@@ -284,8 +243,7 @@ Vector Lattice::position(std::int64_t local) const
     }
     const std::int64_t kz = z_.range.first + iz;
     if (stride_y_) {
-        const auto begin = row_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0),
-                   end = begin + count(y_.range);
+        const auto begin = row_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0), end = begin + count(y_.range);
         iy = std::upper_bound(begin, end, rest) - begin - 1;
         rest -= begin[iy];
     } else {
@@ -296,8 +254,7 @@ Vector Lattice::position(std::int64_t local) const
     const std::int64_t ky = y_.range.first + iy;
     const auto in = row(kz, ky).intervals;
     auto here = in.begin();
-    while (rest > here->before + here->last - here->first)
-        ++here;
+    while (rest > here->before + here->last - here->first) ++here;
     return {coordinate(x_, here->first + rest - here->before), y_of(ky), coordinate(z_, kz)};
 }
 
@@ -305,14 +262,12 @@ std::int64_t Lattice::count_in(const Box& region) const
 {
     const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
     const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
-    if (size_ == 0 || count(zs) <= 0 || count(ys) <= 0)
-        return 0;
+    if (size_ == 0 || count(zs) <= 0 || count(ys) <= 0) return 0;
     std::int64_t sum = 0;
     for (std::int64_t kz = zs.first; kz <= (stride_z_ ? zs.last : zs.first); ++kz)
         for (std::int64_t ky = ys.first; ky <= (stride_y_ ? ys.last : ys.first); ++ky)
             for (const Interval& in : row(kz, ky).intervals)
-                sum +=
-                    std::max<std::int64_t>(0, std::min(in.last, xs.last) - std::max(in.first, xs.first) + 1);
+                sum += std::max<std::int64_t>(0, std::min(in.last, xs.last) - std::max(in.first, xs.first) + 1);
     return sum * (stride_z_ ? 1 : count(zs)) * (stride_y_ ? 1 : count(ys));
 }
 
@@ -321,24 +276,19 @@ bool Lattice::reaches_into(const Shape& other) const
     const Box region = scene::bounds(other);
     const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
     const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
-    if (size_ == 0)
-        return false;
+    if (size_ == 0) return false;
     for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
         for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
             const double y = y_of(ky), z = coordinate(z_, kz), depth = tolerance * spacing_;
             const auto in = row(kz, ky).intervals;
-            if (in.empty() || depth_between_faces(other, y, z, dimensions_) <= depth)
-                continue;
+            if (in.empty() || depth_between_faces(other, y, z, dimensions_) <= depth) continue;
             const auto zones = zones_near_surface(other, y, z, 2 * depth, dimensions_);
             bool found = false;
             for (const Interval& i : in)
-                for_each_run({std::max(i.first, xs.first), std::min(i.last, xs.last)}, zones,
-                             [&](std::int64_t first, std::int64_t) {
-                                 found = found || signed_distance(other, {coordinate(x_, first), y, z},
-                                                                  dimensions_) < -depth;
-                             });
-            if (found)
-                return true;
+                for_each_run({std::max(i.first, xs.first), std::min(i.last, xs.last)}, zones, [&](std::int64_t first, std::int64_t) {
+                    found = found || signed_distance(other, {coordinate(x_, first), y, z}, dimensions_) < -depth;
+                });
+            if (found) return true;
         }
     return false;
 }
@@ -351,10 +301,8 @@ Issues Filling::problems(const Scene& scene)
         std::optional<Lattice> lattice;
     };
     std::vector<Piece> pieces;
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-        pieces.push_back({fmt::format("body.{}", b), &scene.bodies[b].shape, {}});
-    for (std::size_t w = 0; w < scene.walls.size(); ++w)
-        pieces.push_back({fmt::format("wall.{}", w), &scene.walls[w].shape, {}});
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) pieces.push_back({fmt::format("body.{}", b), &scene.bodies[b].shape, {}});
+    for (std::size_t w = 0; w < scene.walls.size(); ++w) pieces.push_back({fmt::format("wall.{}", w), &scene.walls[w].shape, {}});
 
     Issues issues;
     const int dimensions = scene.dimensions;
@@ -366,32 +314,28 @@ Issues Filling::problems(const Scene& scene)
         }
         p.lattice.emplace(*p.shape, scene.space.spacing, dimensions);
         if (p.lattice->size() == 0)
-            issues.push_back(
-                {Severity::Error,
-                 key,
-                 fmt::format("expected particles strictly inside, found none at a spacing of {} m; make "
-                             "the shape larger or space.spacing smaller",
-                             scene.space.spacing),
-                 {}});
+            issues.push_back({Severity::Error,
+                              key,
+                              fmt::format("expected particles strictly inside, found none at a spacing of {} m; make "
+                                          "the shape larger or space.spacing smaller",
+                                          scene.space.spacing),
+                              {}});
     }
     for (std::size_t i = 0; i < pieces.size(); ++i)
         for (std::size_t j = i + 1; j < pieces.size(); ++j) {
             const auto &a = pieces[i], &b = pieces[j];
-            if (!a.lattice || !b.lattice)
-                continue;
+            if (!a.lattice || !b.lattice) continue;
             const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);
-            if (depth <= tolerance * scene.space.spacing)
-                continue;
+            if (depth <= tolerance * scene.space.spacing) continue;
             const bool boxes = std::holds_alternative<Box>(*a.shape) && std::holds_alternative<Box>(*b.shape);
             // Points of one shape outside another are half a spacing from a box's points, and shapes other
             // than boxes share one lattice: no points strictly inside means no points too close.
             if (boxes || a.lattice->reaches_into(*b.shape) || b.lattice->reaches_into(*a.shape))
-                issues.push_back(
-                    {Severity::Error, b.key,
-                     fmt::format("expected shapes that at most touch, found an overlap of {} with {}{}; "
-                                 "move or cut one of them",
-                                 b.key, a.key, boxes ? fmt::format(" by {:.6g} m", depth) : ""),
-                     a.key});
+                issues.push_back({Severity::Error, b.key,
+                                  fmt::format("expected shapes that at most touch, found an overlap of {} with {}{}; "
+                                              "move or cut one of them",
+                                              b.key, a.key, boxes ? fmt::format(" by {:.6g} m", depth) : ""),
+                                  a.key});
         }
     return issues;
 }
@@ -399,10 +343,8 @@ Issues Filling::problems(const Scene& scene)
 Filling::Filling(const Scene& scene) : n_bodies_(scene.bodies.size())
 {
     std::string errors;
-    for (const auto& issue : problems(scene))
-        errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
-    if (!errors.empty())
-        throw BadInput(errors);
+    for (const auto& issue : problems(scene)) errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
+    if (!errors.empty()) throw BadInput(errors);
 
     first_id_ = {0};
     const auto add = [&](const Shape& shape) {
@@ -411,25 +353,21 @@ Filling::Filling(const Scene& scene) : n_bodies_(scene.bodies.size())
         const Box& box = lattices_.back().bounds();
         bounds_ = lattices_.size() == 1 ? box : united(bounds_, box);
     };
-    for (const auto& body : scene.bodies)
-        add(body.shape);
+    for (const auto& body : scene.bodies) add(body.shape);
     soil_bounds_ = bounds_;
-    for (const auto& wall : scene.walls)
-        add(wall.shape);
+    for (const auto& wall : scene.walls) add(wall.shape);
 }
 
 std::int64_t Filling::soil_count_in(const Box& region) const
 {
     std::int64_t sum = 0;
-    for (std::size_t b = 0; b < n_bodies_; ++b)
-        sum += lattices_[b].count_in(region);
+    for (std::size_t b = 0; b < n_bodies_; ++b) sum += lattices_[b].count_in(region);
     return sum;
 }
 std::int64_t Filling::wall_count_in(const Box& region) const
 {
     std::int64_t sum = 0;
-    for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)
-        sum += lattices_[w].count_in(region);
+    for (std::size_t w = n_bodies_; w < lattices_.size(); ++w) sum += lattices_[w].count_in(region);
     return sum;
 }
 

@@ -11,20 +11,15 @@
 #include <utility>
 #include <vector>
 
-namespace kuzure::scene
-{
+namespace kuzure::scene {
 
 /// Coordinate (m) of lattice point k along one axis: the only place where it is computed.
-inline double lattice_coordinate(double origin, std::int64_t k, double spacing)
-{
-    return origin + (double(k) + 0.5) * spacing;
-}
+inline double lattice_coordinate(double origin, std::int64_t k, double spacing) { return origin + (double(k) + 0.5) * spacing; }
 
 /// The lattice points inside one shape. Order of local ids: z slowest, then y, then x. Boxes keep three
 /// numbers; other shapes keep, for every row along x, the intervals that lie inside.
-class Lattice
-{
-  public:
+class Lattice {
+public:
     /// Throws Broken if the shape cannot be filled: ask problem() first.
     Lattice(const Shape&, double spacing, int dimensions);
     /// Why the shape cannot be filled with whole lattice points, or empty.
@@ -42,7 +37,7 @@ class Lattice
     /// True if a lattice point lies strictly inside another shape.
     bool reaches_into(const Shape& other) const;
 
-  private:
+private:
     struct Interval {
         std::int64_t first, last; // indices along x, inclusive
         std::int64_t before;      // points of the same row in front of it
@@ -58,10 +53,7 @@ class Lattice
         double origin = 0;
         Range range{0, 0};
     };
-    double coordinate(const Axis& a, std::int64_t k) const
-    {
-        return lattice_coordinate(a.origin, k, spacing_);
-    }
+    double coordinate(const Axis& a, std::int64_t k) const { return lattice_coordinate(a.origin, k, spacing_); }
     double y_of(std::int64_t k) const { return dimensions_ == 2 ? 0.0 : coordinate(y_, k); }
     /// Indices of an axis whose coordinates lie in the closed interval low .. high.
     Range within(const Axis&, double low, double high) const;
@@ -82,8 +74,7 @@ class Lattice
     {
         const std::int64_t iz = kz - z_.range.first, iy = ky - y_.range.first;
         const std::int64_t layers = stride_z_ ? layer_id_[std::size_t(iz)] : iz * layer_id_[1];
-        if (stride_y_ == 0)
-            return layers + iy * row(kz, ky).size;
+        if (stride_y_ == 0) return layers + iy * row(kz, ky).size;
         const std::size_t layer = stride_z_ ? std::size_t(iz) : 0, n_y = std::size_t(count(y_.range));
         return layers + row_id_[layer * n_y + std::size_t(iy)];
     }
@@ -96,16 +87,14 @@ class Lattice
     std::vector<std::size_t> row_start_; // first interval of every stored row, and the end
     std::vector<Interval> intervals_;
     std::vector<std::int64_t> layer_id_; // id of the first point of every stored layer, and the end
-    std::vector<std::int64_t>
-        row_id_; // id of a row's first point within its layer, where rows change along y
+    std::vector<std::int64_t> row_id_;   // id of a row's first point within its layer, where rows change along y
     std::int64_t size_ = 0;
     Box bounds_{};
 };
 
 /// All bodies and walls of a scene. Ids from 0: soil in file order, then walls.
-class Filling
-{
-  public:
+class Filling {
+public:
     /// Throws BadInput with the text of every error that problems() finds.
     explicit Filling(const Scene&);
     /// Boxes that do not hold whole particles, empty bodies, overlaps.
@@ -125,16 +114,14 @@ class Filling
     template <class Visit> void for_each_soil_in(const Box& region, Visit visit) const
     {
         for (std::size_t b = 0; b < n_bodies_; ++b)
-            lattices_[b].for_each_in(region,
-                                     [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
+            lattices_[b].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
     }
     /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising
     /// id.
     template <class Visit> void for_each_wall_in(const Box& region, Visit visit) const
     {
         for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)
-            lattices_[w].for_each_in(
-                region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
+            lattices_[w].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
     }
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;
@@ -147,7 +134,7 @@ class Filling
     Vector wall_position(std::int64_t id) const;
     int wall_of(std::int64_t wall_id) const;
 
-  private:
+private:
     std::size_t owner(std::int64_t id) const;
 
     std::size_t n_bodies_;
@@ -166,15 +153,13 @@ template <class Visit> void Lattice::for_each_in(const Box& region, Visit visit)
             const std::int64_t first = row_id(kz, ky);
             for (const Interval& in : row(kz, ky).intervals) {
                 const std::int64_t a = std::max(in.first, xs.first), b = std::min(in.last, xs.last);
-                for (std::int64_t k = a; k <= b; ++k)
-                    visit(first + in.before + (k - in.first), Vector{coordinate(x_, k), y, z});
+                for (std::int64_t k = a; k <= b; ++k) visit(first + in.before + (k - in.first), Vector{coordinate(x_, k), y, z});
             }
         }
 }
 
 } // namespace kuzure::scene
 
-namespace kuzure
-{
+namespace kuzure {
 using scene::Filling;
 }

@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace kuzure::scene
-{
+namespace kuzure::scene {
 
 enum class Severity { Warning, Error };
 struct Issue {

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kuzure
-{
+namespace kuzure {
 
 /// Drucker-Prager cone sqrt(J2) + alpha I1 <= k over isotropic linear elasticity, tension positive.
 struct Material {
@@ -15,8 +14,7 @@ struct Material {
     double sound_speed; // c_p = sqrt((K + 4 G/3)/rho), m/s
     double alpha, k;    // 1, Pa
     double alpha_psi;   // 1, slope of the plastic potential sqrt(J2) + alpha_psi I1
-    double
-        apex; // Pa, largest trace I1: k/alpha or 3 p_t of the cut-off; infinite without friction and cut-off
+    double apex;        // Pa, largest trace I1: k/alpha or 3 p_t of the cut-off; infinite without friction and cut-off
 
     /// Slope alpha of the cone through a friction (or dilation) angle in rad.
     static double slope(scene::Cone cone, double angle)
@@ -62,8 +60,7 @@ struct Material {
         m.k = strength(soil.cone, soil.friction_angle, soil.cohesion);
         m.alpha_psi = slope(soil.cone, soil.dilation_angle);
         m.apex = m.alpha > 0 ? m.k / m.alpha : std::numeric_limits<double>::infinity();
-        if (soil.tension_cutoff)
-            m.apex = std::min(m.apex, 3 * *soil.tension_cutoff);
+        if (soil.tension_cutoff) m.apex = std::min(m.apex, 3 * *soil.tension_cutoff);
         return m;
     }
     /// Largest alpha for which a soil without cohesion bears no tensile principal stress: 1/(2 sqrt 3),

@@ -8,8 +8,7 @@
 #include <variant>
 #include <vector>
 
-namespace kuzure::scene
-{
+namespace kuzure::scene {
 
 // ---- shapes (solver/scene/shape.hpp knows their geometry) ----
 struct Box {
@@ -146,8 +145,7 @@ struct Time {
 
 } // namespace kuzure::scene
 
-namespace kuzure
-{
+namespace kuzure {
 
 struct Scene {
     std::string title;
@@ -167,8 +165,7 @@ struct Scene {
     /// Volume (3-D, m^3) or area (2-D, m^2 per metre of thickness) of one particle.
     double particle_volume() const
     {
-        return dimensions == 3 ? space.spacing * space.spacing * space.spacing
-                               : space.spacing * space.spacing;
+        return dimensions == 3 ? space.spacing * space.spacing * space.spacing : space.spacing * space.spacing;
     }
     bool operator==(const Scene&) const = default;
 };

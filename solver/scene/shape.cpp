@@ -1,10 +1,8 @@
 #include "solver/scene/shape.hpp"
 #include <limits>
 
-namespace kuzure::scene
-{
-namespace
-{
+namespace kuzure::scene {
+namespace {
 
 struct Point {
     double x, z;
@@ -24,8 +22,7 @@ bool encloses(const Polygon& polygon, Point x)
     bool inside = false;
     for (std::size_t k = 0; k < polygon.points.size(); ++k) {
         const Point a = corner(polygon, k), b = corner(polygon, k + 1);
-        if ((a.z > x.z) != (b.z > x.z) && x.x < a.x + (x.z - a.z) / (b.z - a.z) * (b.x - a.x))
-            inside = !inside;
+        if ((a.z > x.z) != (b.z > x.z) && x.x < a.x + (x.z - a.z) / (b.z - a.z) * (b.x - a.x)) inside = !inside;
     }
     return inside;
 }
@@ -45,8 +42,7 @@ Contact contact_in_plane(const Polygon& polygon, Point x)
         const Point a = corner(polygon, k), e = corner(polygon, k + 1) - a;
         const double t = std::clamp(dot(x - a, e) / dot(e, e), 0.0, 1.0);
         const Point d = x - Point{a.x + t * e.x, a.z + t * e.z};
-        if (const double d2 = dot(d, d); d2 < nearest)
-            nearest = d2, where = t, edge = k;
+        if (const double d2 = dot(d, d); d2 < nearest) nearest = d2, where = t, edge = k;
     }
     if (where > 0 && where < 1) {
         const Point out = outward(edge);
@@ -59,10 +55,8 @@ Contact contact_in_plane(const Polygon& polygon, Point x)
     const double l = std::hypot(d.x, d.z);
     const double sign = encloses(polygon, x) ? -1 : 1;
     const Point e = corner(polygon, k + 1) - corner(polygon, k);
-    if (l > 1e-12 * std::hypot(e.x, e.z))
-        return {sign * l, {sign * d.x / l, 0, sign * d.z / l}};
-    const Point before = outward((k + n - 1) % n), after = outward(k),
-                sum{before.x + after.x, before.z + after.z};
+    if (l > 1e-12 * std::hypot(e.x, e.z)) return {sign * l, {sign * d.x / l, 0, sign * d.z / l}};
+    const Point before = outward((k + n - 1) % n), after = outward(k), sum{before.x + after.x, before.z + after.z};
     const double s = std::hypot(sum.x, sum.z);
     return {0, s > 1e-12 ? Vector{sum.x / s, 0, sum.z / s} : Vector{after.x, 0, after.z}};
 }
@@ -72,14 +66,11 @@ bool meet(Point a, Point b, Point c, Point d)
 {
     const auto side = [](Point p, Point q, Point r) { return cross(q - p, r - p); };
     const auto within = [](Point p, Point q, Point r) {
-        return std::min(p.x, q.x) <= r.x && r.x <= std::max(p.x, q.x) && std::min(p.z, q.z) <= r.z &&
-               r.z <= std::max(p.z, q.z);
+        return std::min(p.x, q.x) <= r.x && r.x <= std::max(p.x, q.x) && std::min(p.z, q.z) <= r.z && r.z <= std::max(p.z, q.z);
     };
     const double c1 = side(a, b, c), d1 = side(a, b, d), a1 = side(c, d, a), b1 = side(c, d, b);
-    if (((c1 > 0) != (d1 > 0)) && ((a1 > 0) != (b1 > 0)) && c1 != 0 && d1 != 0 && a1 != 0 && b1 != 0)
-        return true;
-    return (c1 == 0 && within(a, b, c)) || (d1 == 0 && within(a, b, d)) || (a1 == 0 && within(c, d, a)) ||
-           (b1 == 0 && within(c, d, b));
+    if (((c1 > 0) != (d1 > 0)) && ((a1 > 0) != (b1 > 0)) && c1 != 0 && d1 != 0 && a1 != 0 && b1 != 0) return true;
+    return (c1 == 0 && within(a, b, c)) || (d1 == 0 && within(a, b, d)) || (a1 == 0 && within(c, d, a)) || (b1 == 0 && within(c, d, b));
 }
 
 } // namespace
@@ -87,8 +78,7 @@ bool meet(Point a, Point b, Point c, Point d)
 Contact contact(const Polygon& polygon, Vector x, int dimensions)
 {
     const auto in_plane = contact_in_plane(polygon, {x.x, x.z});
-    if (dimensions == 2)
-        return in_plane;
+    if (dimensions == 2) return in_plane;
     return detail::intersect(in_plane, detail::slab(x.y, polygon.y[0], polygon.y[1], {0, 1, 0}));
 }
 
@@ -98,8 +88,7 @@ Box bounds(const Shape& shape)
         Box operator()(const Box& b) const { return b; }
         Box operator()(const Cylinder& c) const
         {
-            return {{c.base.x - c.radius, c.base.y - c.radius, c.base.z},
-                    {c.base.x + c.radius, c.base.y + c.radius, c.base.z + c.height}};
+            return {{c.base.x - c.radius, c.base.y - c.radius, c.base.z}, {c.base.x + c.radius, c.base.y + c.radius, c.base.z + c.height}};
         }
         Box operator()(const Sphere& s) const
         {
@@ -130,8 +119,7 @@ double area(const Polygon& polygon)
 {
     double sum = 0;
     const Point origin = corner(polygon, 0);
-    for (std::size_t k = 1; k + 1 < polygon.points.size(); ++k)
-        sum += cross(corner(polygon, k) - origin, corner(polygon, k + 1) - origin);
+    for (std::size_t k = 1; k + 1 < polygon.points.size(); ++k) sum += cross(corner(polygon, k) - origin, corner(polygon, k + 1) - origin);
     return 0.5 * sum;
 }
 
@@ -140,14 +128,11 @@ bool crosses_itself(const Polygon& polygon)
     const std::size_t n = polygon.points.size();
     for (std::size_t i = 0; i < n; ++i) {
         const Point a = corner(polygon, i), b = corner(polygon, i + 1), c = corner(polygon, i + 2);
-        if (a.x == b.x && a.z == b.z)
-            return true;
+        if (a.x == b.x && a.z == b.z) return true;
         // Neighbouring edges share a corner; they may not run back over each other.
-        if (cross(b - a, c - b) == 0 && dot(b - a, c - b) < 0)
-            return true;
+        if (cross(b - a, c - b) == 0 && dot(b - a, c - b) < 0) return true;
         for (std::size_t j = i + 2; j < n; ++j)
-            if (!(i == 0 && j == n - 1) && meet(a, b, corner(polygon, j), corner(polygon, j + 1)))
-                return true;
+            if (!(i == 0 && j == n - 1) && meet(a, b, corner(polygon, j), corner(polygon, j + 1))) return true;
     }
     return false;
 }

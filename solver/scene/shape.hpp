@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kuzure::scene
-{
+namespace kuzure::scene {
 
 /// Distance (m, negative inside) from a point to a surface, and the outward unit normal at the closest point.
 struct Contact {
@@ -14,8 +13,7 @@ struct Contact {
     Vector normal;
 };
 
-namespace detail
-{
+namespace detail {
 /// Where the surfaces of two slabs meet: outside both the edge is closest, else the farther surface counts.
 KUZURE_INLINE Contact intersect(const Contact& a, const Contact& b)
 {
@@ -38,16 +36,14 @@ KUZURE_INLINE Contact contact(const Box& box, Vector x, int dimensions = 3)
     const auto along_z = detail::slab(x.z, box.low.z, box.high.z, {0, 0, 1});
     const auto along_x = detail::slab(x.x, box.low.x, box.high.x, {1, 0, 0});
     const auto in_plane = detail::intersect(along_z, along_x);
-    if (dimensions == 2)
-        return in_plane;
+    if (dimensions == 2) return in_plane;
     return detail::intersect(in_plane, detail::slab(x.y, box.low.y, box.high.y, {0, 1, 0}));
 }
 /// Distance and normal of a sphere; the normal at the centre is z.
 inline Contact contact(const Sphere& sphere, Vector x, int dimensions = 3)
 {
     Vector d = x - sphere.center;
-    if (dimensions == 2)
-        d.y = 0;
+    if (dimensions == 2) d.y = 0;
     const double r = std::hypot(d.x, d.y, d.z);
     return {r - sphere.radius, r > 0 ? Vector{d.x / r, d.y / r, d.z / r} : Vector{0, 0, 1}};
 }
@@ -63,21 +59,14 @@ Contact contact(const Polygon&, Vector x, int dimensions = 3);
 /// Distance and normal of any shape.
 inline Contact contact(const Shape& shape, Vector x, int dimensions = 3)
 {
-    if (const Box* box = std::get_if<Box>(&shape))
-        return contact(*box, x, dimensions);
+    if (const Box* box = std::get_if<Box>(&shape)) return contact(*box, x, dimensions);
     return std::visit([&](const auto& s) { return contact(s, x, dimensions); }, shape);
 }
 
 /// Distance (m) from a point to the surface, negative inside.
-inline double signed_distance(const Shape& shape, Vector x, int dimensions = 3)
-{
-    return contact(shape, x, dimensions).distance;
-}
+inline double signed_distance(const Shape& shape, Vector x, int dimensions = 3) { return contact(shape, x, dimensions).distance; }
 /// True strictly inside: not on the surface.
-inline bool contains(const Shape& shape, Vector x, int dimensions = 3)
-{
-    return signed_distance(shape, x, dimensions) < 0;
-}
+inline bool contains(const Shape& shape, Vector x, int dimensions = 3) { return signed_distance(shape, x, dimensions) < 0; }
 /// The smallest box around a shape; in 2-D its y is that of the file and means nothing.
 Box bounds(const Shape&);
 /// "box", "cylinder", "sphere" or "polygon": the scene's key.

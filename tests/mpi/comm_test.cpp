@@ -4,10 +4,8 @@
 #include <numeric>
 #include <random>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 std::vector<std::byte> bytes_of(const std::string& s)
 {
@@ -29,13 +27,11 @@ TEST(Comm, IsATeam)
     EXPECT_EQ(team.sum_below(rank + 1), std::int64_t(rank) * (rank + 1) / 2);
     EXPECT_TRUE(team.any(rank == size - 1));
     EXPECT_EQ(team.all(rank == 0), size == 1);
-    EXPECT_EQ(team.broadcast(rank == size - 1 ? std::string("from the last") : std::string(), size - 1),
-              "from the last");
+    EXPECT_EQ(team.broadcast(rank == size - 1 ? std::string("from the last") : std::string(), size - 1), "from the last");
     const auto all = team.gather(bytes_of(std::string(std::size_t(rank), 'x')), size - 1);
     if (rank == size - 1) {
         ASSERT_EQ(int(all.size()), size);
-        for (int r = 0; r < size; ++r)
-            EXPECT_EQ(int(all[r].size()), r);
+        for (int r = 0; r < size; ++r) EXPECT_EQ(int(all[r].size()), r);
     } else {
         EXPECT_TRUE(all.empty());
     }
@@ -47,12 +43,10 @@ TEST(Comm, AllgatherKeepsTheOrderOfTheRanks)
 {
     const int rank = world().rank(), size = world().size();
     const auto one = world().allgather(rank * 10);
-    for (int r = 0; r < size; ++r)
-        EXPECT_EQ(one[r], r * 10);
+    for (int r = 0; r < size; ++r) EXPECT_EQ(one[r], r * 10);
     const std::vector<double> mine(std::size_t(rank % 3), rank);
     std::vector<double> expected;
-    for (int r = 0; r < size; ++r)
-        expected.insert(expected.end(), std::size_t(r % 3), r);
+    for (int r = 0; r < size; ++r) expected.insert(expected.end(), std::size_t(r % 3), r);
     EXPECT_EQ(world().allgather(std::span<const double>(mine)), expected);
 }
 
@@ -61,8 +55,7 @@ std::vector<std::byte> letter(int a, int b, int round)
 {
     std::mt19937 random(unsigned(a * 7919 + b * 104729 + round));
     std::vector<std::byte> bytes(random() % 4 == 0 ? random() % 300000 : random() % 100);
-    for (auto& c : bytes)
-        c = std::byte(random());
+    for (auto& c : bytes) c = std::byte(random());
     return bytes;
 }
 bool writes(int a, int b, int round) { return (a * 31 + b * 17 + round * 7) % 3 == 0; }
@@ -74,13 +67,11 @@ TEST(Comm, ExchangeDeliversEveryMessageOnce)
         const std::size_t piece = round % 2 ? 1000 : Comm::largest_piece;
         std::vector<Message> out;
         for (int b = 0; b < size; ++b)
-            if (writes(rank, b, round))
-                out.push_back({b, letter(rank, b, round)});
+            if (writes(rank, b, round)) out.push_back({b, letter(rank, b, round)});
         const auto in = world().exchange(std::move(out), piece);
         std::size_t k = 0;
         for (int a = 0; a < size; ++a) {
-            if (!writes(a, rank, round))
-                continue;
+            if (!writes(a, rank, round)) continue;
             ASSERT_LT(k, in.size());
             EXPECT_EQ(in[k].rank, a);
             EXPECT_TRUE(in[k].bytes == letter(a, rank, round)) << "from " << a << " in round " << round;
@@ -94,18 +85,15 @@ TEST(Comm, ExchangeKeepsTheOrderOfOneSender)
 {
     const int next = (world().rank() + 1) % world().size();
     std::vector<Parcel<int>> out;
-    for (int k = 0; k < 5; ++k)
-        out.push_back({next, std::vector<int>(std::size_t(k), k)});
+    for (int k = 0; k < 5; ++k) out.push_back({next, std::vector<int>(std::size_t(k), k)});
     const auto in = world().exchange(out);
     ASSERT_EQ(in.size(), 5u);
-    for (int k = 0; k < 5; ++k)
-        EXPECT_EQ(in[k].items, std::vector<int>(std::size_t(k), k));
+    for (int k = 0; k < 5; ++k) EXPECT_EQ(in[k].items, std::vector<int>(std::size_t(k), k));
 }
 
 TEST(Comm, ExchangeRefusesARankThatDoesNotExist)
 {
-    if (world().size() > 1)
-        return; // the others would wait for the one that throws
+    if (world().size() > 1) return; // the others would wait for the one that throws
     std::vector<Message> out;
     out.push_back({1, {}});
     EXPECT_THROW(world().exchange(std::move(out)), Broken);
@@ -133,15 +121,13 @@ TEST(Rebalance, CutsWhenTheIdleTimeHasPaidForIt)
 {
     if (world().size() == 1) {
         Rebalance alone;
-        for (int k = 0; k < 100; ++k)
-            EXPECT_FALSE(alone.due(world(), 1.0 + k));
+        for (int k = 0; k < 100; ++k) EXPECT_FALSE(alone.due(world(), 1.0 + k));
         return;
     }
     const bool last = world().rank() == world().size() - 1;
     Rebalance rule(1.0, 5.0);
     int calls = 0;
-    while (calls < 1000 && !rule.due(world(), last ? 1.0 + 0.01 * calls : 1.0))
-        ++calls;
+    while (calls < 1000 && !rule.due(world(), last ? 1.0 + 0.01 * calls : 1.0)) ++calls;
     EXPECT_GT(calls, 10);
     EXPECT_LT(calls, 100);
     EXPECT_GT(rule.idle_seconds(), 5.0);
@@ -149,12 +135,10 @@ TEST(Rebalance, CutsWhenTheIdleTimeHasPaidForIt)
 
     // The cut achieves nothing: the rule must fall silent.
     rule.cut(world(), 5.0);
-    for (int k = 0; k < 300; ++k)
-        ASSERT_FALSE(rule.due(world(), last ? 1.4 + 0.02 * (k % 2) : 1.0));
+    for (int k = 0; k < 300; ++k) ASSERT_FALSE(rule.due(world(), last ? 1.4 + 0.02 * (k % 2) : 1.0));
     // It gets worse again: the rule must wake up.
     bool again = false;
-    for (int k = 0; k < 300 && !again; ++k)
-        again = rule.due(world(), last ? 2.5 : 1.0);
+    for (int k = 0; k < 300 && !again; ++k) again = rule.due(world(), last ? 2.5 : 1.0);
     EXPECT_TRUE(again);
 }
 

@@ -7,10 +7,8 @@
 #include <random>
 #include <set>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 struct Cloud {
     const char* name;
@@ -24,36 +22,9 @@ struct Cloud {
 
 const Cloud clouds[] = {
     {"open", 3000, {-1, 0, 0}, {3, 2, 1}, {-1, 0, 0}, {0.25, 0.25, 0.25}, {}, {}, {}, 0.11},
-    {"blocks smaller than the reach",
-     1500,
-     {0, 0, 0},
-     {2, 2, 2},
-     {0, 0, 0},
-     {0.1, 0.07, 0.13},
-     {},
-     {},
-     {},
-     0.3},
-    {"periodic in y",
-     2000,
-     {0, 1, 0},
-     {3, 1, 1},
-     {0, 1, 0},
-     {0.25, 0.25, 0.25},
-     {false, true, false},
-     {0, 1, 0},
-     {0, 1, 0},
-     0.15},
-    {"one block per period",
-     800,
-     {0, 0, 0},
-     {4, 0.5, 0.5},
-     {0, 0, 0},
-     {0.25, 0.5, 0.5},
-     {false, true, false},
-     {0, 0, 0},
-     {0, 0.5, 0},
-     0.3},
+    {"blocks smaller than the reach", 1500, {0, 0, 0}, {2, 2, 2}, {0, 0, 0}, {0.1, 0.07, 0.13}, {}, {}, {}, 0.3},
+    {"periodic in y", 2000, {0, 1, 0}, {3, 1, 1}, {0, 1, 0}, {0.25, 0.25, 0.25}, {false, true, false}, {0, 1, 0}, {0, 1, 0}, 0.15},
+    {"one block per period", 800, {0, 0, 0}, {4, 0.5, 0.5}, {0, 0, 0}, {0.25, 0.5, 0.5}, {false, true, false}, {0, 0, 0}, {0, 0.5, 0}, 0.3},
     {"periodic all around, origin off the seam",
      1200,
      {0, 0, 0},
@@ -88,8 +59,7 @@ struct Particle {
 std::vector<Particle> everybody(const Particles& p)
 {
     std::vector<Particle> mine;
-    for (Index i = 0; i < p.size(); ++i)
-        mine.push_back({p[field::id][i], p[field::position][i]});
+    for (Index i = 0; i < p.size(); ++i) mine.push_back({p[field::id][i], p[field::position][i]});
     auto all = world().allgather(std::span<const Particle>(mine));
     std::ranges::sort(all, {}, &Particle::id);
     return all;
@@ -103,10 +73,8 @@ Particles scatter(const Cloud& c, unsigned seed)
     Particles p;
     p.require(field::soil, field::sorted_position, field::stress);
     for (int id = 0; id < c.n; ++id) {
-        const Vector x{c.low.x + u(random) * c.size.x, c.low.y + u(random) * c.size.y,
-                       c.low.z + u(random) * c.size.z};
-        if (int(random() % unsigned(world().size())) != world().rank())
-            continue;
+        const Vector x{c.low.x + u(random) * c.size.x, c.low.y + u(random) * c.size.y, c.low.z + u(random) * c.size.z};
+        if (int(random() % unsigned(world().size())) != world().rank()) continue;
         const Index i = p.size();
         p.resize(i + 1);
         p[field::id].set(i, std::int64_t(id));
@@ -118,16 +86,12 @@ Particles scatter(const Cloud& c, unsigned seed)
     return p;
 }
 
-Domain domain_of(const Cloud& c)
-{
-    return Domain(world(), c.origin, c.block, c.periodic, c.period_low, c.period_length);
-}
+Domain domain_of(const Cloud& c) { return Domain(world(), c.origin, c.block, c.periodic, c.period_low, c.period_length); }
 
 std::vector<BlockWork> blocks_of(const Domain& d, const Particles& p)
 {
     std::vector<BlockWork> b;
-    for (Index i = 0; i < p.size(); ++i)
-        b.push_back({d.block_of(p[field::position][i]), 1.0, 1.0});
+    for (Index i = 0; i < p.size(); ++i) b.push_back({d.block_of(p[field::position][i]), 1.0, 1.0});
     return b;
 }
 
@@ -135,8 +99,7 @@ void expect_nobody_lost(const Particles& p, int n)
 {
     const auto all = everybody(p);
     ASSERT_EQ(int(all.size()), n);
-    for (int k = 0; k < n; ++k)
-        ASSERT_EQ(all[k].id, k);
+    for (int k = 0; k < n; ++k) ASSERT_EQ(all[k].id, k);
     for (Index i = 0; i < p.size(); ++i) {
         const Stress s = p[field::stress][i];
         const Vector x = p[field::sorted_position][i];
@@ -157,15 +120,11 @@ void drift(const Cloud& c, Particles& p, double d, unsigned seed)
         std::uniform_real_distribution<> u(-d, d);
         for (int a = 0; a < 3; ++a) {
             double& v = x.column[a][i];
-            if (a == 1 && c.size.y == 0)
-                continue;
+            if (a == 1 && c.size.y == 0) continue;
             v += u(random);
-            if (!c.periodic[a])
-                continue;
-            if (v < low[a])
-                v += length[a];
-            if (v >= low[a] + length[a])
-                v -= length[a];
+            if (!c.periodic[a]) continue;
+            if (v < low[a]) v += length[a];
+            if (v >= low[a] + length[a]) v -= length[a];
         }
     }
 }
@@ -181,8 +140,7 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
     Halo halo(world(), plan, sizeof(Row));
     const auto all = everybody(p);
     std::vector<char> own(all.size(), 0);
-    for (Index i = 0; i < p.size(); ++i)
-        own[p[field::id][i]] = 1;
+    for (Index i = 0; i < p.size(); ++i) own[p[field::id][i]] = 1;
 
     const auto x = p[field::position];
     const auto rows = halo.collect<Row>([&](Index i, Vector s) { return Row{p[field::id][i], 0, x[i] + s}; });
@@ -194,10 +152,8 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
         int shift = -1;
         for (int s = 0; s < 27; ++s) {
             const Vector d = plan.shift[s];
-            if (s != HaloPlan::no_shift && d == Vector{})
-                continue;
-            if (all[g.id].x + d == g.x)
-                shift = s;
+            if (s != HaloPlan::no_shift && d == Vector{}) continue;
+            if (all[g.id].x + d == g.x) shift = s;
         }
         ASSERT_GE(shift, 0) << "ghost " << g.id << " is nowhere near its owner";
         EXPECT_TRUE(present.insert({g.id, shift}).second) << "ghost " << g.id << " twice";
@@ -209,13 +165,11 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
     for (const auto& j : all)
         for (int s = 0; s < 27; ++s) {
             const Vector d = plan.shift[s];
-            if ((s != HaloPlan::no_shift && d == Vector{}) || (s == HaloPlan::no_shift && own[j.id]))
-                continue;
+            if ((s != HaloPlan::no_shift && d == Vector{}) || (s == HaloPlan::no_shift && own[j.id])) continue;
             const Vector at = j.x + d;
             for (Index i = 0; i < p.size(); ++i) {
                 const Vector r = x[i] - at;
-                if (dot(r, r) >= c.reach * c.reach)
-                    continue;
+                if (dot(r, r) >= c.reach * c.reach) continue;
                 ++wanted;
                 missing += !present.contains({j.id, s});
                 break;
@@ -235,18 +189,15 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
 
     // Refreshes deliver what the owner has now, to the slot it was given.
     std::vector<Index> slot(rows.size());
-    for (std::size_t k = 0; k < slot.size(); ++k)
-        slot[k] = Index(slot.size() - 1 - k);
+    for (std::size_t k = 0; k < slot.size(); ++k) slot[k] = Index(slot.size() - 1 - k);
     for (std::int64_t step = 1; step <= 6; ++step) {
-        if (step == 3)
-            halo.place(slot);
+        if (step == 3) halo.place(slot);
         halo.begin([&](Index i, Vector s, std::byte* to) {
             const Row r{p[field::id][i], step, x[i] + s};
             std::memcpy(to, &r, sizeof r);
         });
         if (step % 2)
-            for (int k = 0; k < 3; ++k)
-                halo.progress();
+            for (int k = 0; k < 3; ++k) halo.progress();
         std::vector<Row> arrived(rows.size(), Row{-1, -1, {}});
         halo.arrive([&](Index at, const std::byte* from) { std::memcpy(&arrived[at], from, sizeof(Row)); });
         for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -260,17 +211,13 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
     std::int64_t sent = 0;
     int messages = 0;
     for (const auto& peer : plan.peers)
-        if (peer.rank != world().rank())
-            sent += std::int64_t(peer.sends.size() * sizeof(Row)), ++messages;
+        if (peer.rank != world().rank()) sent += std::int64_t(peer.sends.size() * sizeof(Row)), ++messages;
     EXPECT_EQ(halo.bytes_per_refresh(), sent);
     EXPECT_EQ(halo.messages_per_refresh(), messages);
 }
 
-class Clouds : public testing::TestWithParam<Cloud>
-{
-};
-INSTANTIATE_TEST_SUITE_P(Halo, Clouds, testing::ValuesIn(clouds),
-                         [](const auto& info) { return std::to_string(info.index); });
+class Clouds : public testing::TestWithParam<Cloud> {};
+INSTANTIATE_TEST_SUITE_P(Halo, Clouds, testing::ValuesIn(clouds), [](const auto& info) { return std::to_string(info.index); });
 
 TEST_P(Clouds, MigrateAndSeeEveryPair)
 {
@@ -280,8 +227,7 @@ TEST_P(Clouds, MigrateAndSeeEveryPair)
     Domain domain = domain_of(c);
     domain.cut(blocks_of(domain, p));
     const auto on_their_owners = [&] {
-        for (Index i = 0; i < p.size(); ++i)
-            ASSERT_EQ(domain.owner_of(p[field::position][i]), world().rank());
+        for (Index i = 0; i < p.size(); ++i) ASSERT_EQ(domain.owner_of(p[field::position][i]), world().rank());
     };
     const auto moved = domain.migrate(p);
     EXPECT_EQ(world().sum(moved.left), world().sum(moved.arrived));
@@ -312,8 +258,7 @@ TEST(Halo, OneRankMayHaveEverything)
     Particles p = scatter(c, 3);
     Domain domain = domain_of(c);
     std::vector<BlockWork> mine;
-    if (world().rank() == 0)
-        mine.push_back({{0, 0, 0}, 1.0, 1.0}); // one occupied block: rank 0 owns all space
+    if (world().rank() == 0) mine.push_back({{0, 0, 0}, 1.0, 1.0}); // one occupied block: rank 0 owns all space
     domain.cut(mine);
     domain.migrate(p);
     EXPECT_EQ(p.size(), world().rank() == 0 ? c.n : 0);
@@ -352,8 +297,7 @@ TEST(Halo, RefusesMisuse)
     halo.arrive(put);
     EXPECT_THROW(halo.place(std::vector<Index>(std::size_t(halo.n_ghosts()) + 1)), Broken);
 
-    if (p.size() > 0 && world().rank() == 0)
-        p[field::position].set(0, Vector{NAN, 0, 0});
+    if (p.size() > 0 && world().rank() == 0) p[field::position].set(0, Vector{NAN, 0, 0});
     EXPECT_THROW(domain.migrate(p), NumbersFailed); // on every rank
     EXPECT_THROW(domain.plan_halo(p, 0.1), NumbersFailed);
 }
@@ -380,8 +324,7 @@ TEST(Halo, IsRenewed)
             std::memcpy(&id, from, sizeof id);
             sum += id;
         });
-        for (const auto& g : halo->ghosts(p))
-            expected += g.id;
+        for (const auto& g : halo->ghosts(p)) expected += g.id;
         ASSERT_EQ(sum, expected);
         drift(c, p, 0.02, unsigned(k));
         domain.migrate(p);

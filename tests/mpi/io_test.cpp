@@ -15,26 +15,22 @@
 using namespace kuzure;
 using testing::HasSubstr;
 
-namespace
-{
+namespace {
 
-class IoTest : public testing::Test
-{
-  protected:
+class IoTest : public testing::Test {
+protected:
     void SetUp() override
     {
         char name[] = "/tmp/kuzure_io_XXXXXX";
         std::string made;
-        if (world().rank() == 0 && mkdtemp(name))
-            made = name;
+        if (world().rank() == 0 && mkdtemp(name)) made = name;
         dir = world().broadcast(made);
         ASSERT_FALSE(dir.empty());
     }
     void TearDown() override
     {
         world().barrier();
-        if (world().rank() == 0)
-            std::filesystem::remove_all(dir);
+        if (world().rank() == 0) std::filesystem::remove_all(dir);
         world().barrier();
     }
     io::Path dir;
@@ -45,8 +41,7 @@ void fill(Particles& p, Index i, std::int64_t k)
 {
     p.for_each_present([&](auto f) {
         using T = typename decltype(f)::Number;
-        for (int c = 0; c < f.components; ++c)
-            p[f].column[c][i] = T(double(k) / 7 + 1000 * c);
+        for (int c = 0; c < f.components; ++c) p[f].column[c][i] = T(double(k) / 7 + 1000 * c);
     });
     p[field::id].set(i, k);
 }
@@ -55,15 +50,11 @@ Particles share(std::int64_t first, std::int64_t count)
     Particles p;
     p.require(field::velocity, field::stress, field::density, field::origin, field::half_stress, field::soil);
     p.resize(Index(count));
-    for (Index i = 0; i < p.size(); ++i)
-        fill(p, i, first + i);
+    for (Index i = 0; i < p.size(); ++i) fill(p, i, first + i);
     return p;
 }
 /// Rows of this rank: uneven, rank 1 (or the only one but for a few) empty.
-std::int64_t count_here(std::int64_t scale)
-{
-    return world().rank() == 1 ? 0 : scale * (world().rank() + 1) + 3;
-}
+std::int64_t count_here(std::int64_t scale) { return world().rank() == 1 ? 0 : scale * (world().rank() + 1) + 3; }
 
 Particles uneven(std::int64_t scale)
 {
@@ -76,8 +67,7 @@ bool same_bits(const Particles& a, const Particles& b)
     a.for_each_present([&](auto f) {
         same = same && b.has(f);
         for (int c = 0; same && c < f.components; ++c)
-            same = std::memcmp(a[f].column[c], b[f].column[c],
-                               sizeof(a[f].column[c][0]) * std::size_t(a.size())) == 0;
+            same = std::memcmp(a[f].column[c], b[f].column[c], sizeof(a[f].column[c][0]) * std::size_t(a.size())) == 0;
     });
     return same;
 }
@@ -106,8 +96,7 @@ TEST_F(IoTest, ACheckpointOfManyRanksIsReadByAnyNumber)
 
 TEST_F(IoTest, OneRanksCheckpointIsReadByMany)
 {
-    if (world().rank() == 0)
-        io::write_checkpoint(Alone{}, dir, share(0, 5000), "hash", "header");
+    if (world().rank() == 0) io::write_checkpoint(Alone{}, dir, share(0, 5000), "hash", "header");
     world().barrier();
     Particles q;
     EXPECT_EQ(io::read_checkpoint(world(), dir / "checkpoint.h5", q).particles, 5000);
@@ -153,11 +142,9 @@ TEST_F(IoTest, AFailureReachesAllRanks)
 TEST_F(IoTest, AFullDiskFailsOnAllRanksAndHarmsNothing)
 {
     const auto small = dir / "small";
-    const bool mounted = world().any(
-        world().rank() == 0 && std::filesystem::create_directory(small) &&
-        std::system(("mount -t tmpfs -o size=2m none " + small.string() + " 2>/dev/null").c_str()) == 0);
-    if (!mounted)
-        GTEST_SKIP() << "may not mount a small disk here";
+    const bool mounted = world().any(world().rank() == 0 && std::filesystem::create_directory(small) &&
+                                     std::system(("mount -t tmpfs -o size=2m none " + small.string() + " 2>/dev/null").c_str()) == 0);
+    if (!mounted) GTEST_SKIP() << "may not mount a small disk here";
     const Particles few = uneven(10), many = uneven(50000);
     io::write_checkpoint(world(), small, few, "hash", "good");
     std::string said;
@@ -186,16 +173,14 @@ TEST_F(IoTest, AFullDiskFailsOnAllRanksAndHarmsNothing)
     EXPECT_FALSE(std::filesystem::exists(small / "grows.h5"));
     EXPECT_EQ(io::verify_checkpoint(world(), small / "checkpoint.h5").header, "good");
     world().barrier();
-    if (world().rank() == 0)
-        EXPECT_EQ(std::system(("umount " + small.string()).c_str()), 0);
+    if (world().rank() == 0) EXPECT_EQ(std::system(("umount " + small.string()).c_str()), 0);
 }
 
 TEST_F(IoTest, ASnapshotOfManyRanksIsOneGrid)
 {
     const Particles p = uneven(1000);
     io::WallPoints walls;
-    if (world().rank() == 0)
-        walls = {{{1, 2, 3}}, {1 << 20}, {2000}};
+    if (world().rank() == 0) walls = {{{1, 2, 3}}, {1 << 20}, {2000}};
     io::Snapshots snapshots(world(), dir);
     const auto file = snapshots.write(p, walls, {0.5, 3, 3, "many", {}});
     const std::int64_t total = world().sum(std::int64_t(p.size())) + 1;
@@ -206,8 +191,7 @@ TEST_F(IoTest, ASnapshotOfManyRanksIsOneGrid)
     in.rows("/VTKHDF/PointData/id", 0, std::uint64_t(total), 1, ids);
     in.rows("/VTKHDF/Offsets", 0, std::uint64_t(total) + 1, 1, offsets);
     in.rows("/VTKHDF/PointData/stress", 0, std::uint64_t(total), 6, stress);
-    for (std::int64_t i = 0; i <= total; ++i)
-        ASSERT_EQ(offsets[std::size_t(i)], i);
+    for (std::int64_t i = 0; i <= total; ++i) ASSERT_EQ(offsets[std::size_t(i)], i);
     const auto rank0 = world().max(world().rank() == 0 ? std::int64_t(p.size()) : 0);
     for (std::int64_t i = 0; i < total; ++i) {
         const std::int64_t k = i < rank0 ? i : i - 1; // rank 0's wall point follows its soil
@@ -231,8 +215,7 @@ TEST_F(IoTest, HistoryIsWrittenOnceAndGoesOn)
     io::HistoryRow row{};
     {
         io::History h(world(), dir / "h.csv", 3);
-        for (int k = 0; k < 4; ++k)
-            row.time = k, h.append(row);
+        for (int k = 0; k < 4; ++k) row.time = k, h.append(row);
     }
     world().barrier();
     {
@@ -254,8 +237,7 @@ TEST_F(IoTest, ThePictureIsTheSameForAnyNumberOfRanks)
         p.require(field::origin);
         p.resize(Index(last - first));
         for (auto k = first; k < last; ++k)
-            p[field::position].set(Index(k - first), Vector{0.1 * double(k % 12), 0.1 * double(k / 12 % 12),
-                                                            0.1 * double(k / 144)});
+            p[field::position].set(Index(k - first), Vector{0.1 * double(k % 12), 0.1 * double(k / 12 % 12), 0.1 * double(k / 144)});
         return p;
     };
     const io::PictureLabel label{{}, 3, {0, 0, 0}, {1.1, 1.1, 1.1}, 0.1, "the same", 0, {}, 480, 270};

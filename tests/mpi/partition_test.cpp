@@ -5,18 +5,15 @@
 #include <random>
 #include <set>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 std::vector<BlockWork> box_of_blocks(int nx, int ny, int nz, Block at = {0, 0, 0})
 {
     std::vector<BlockWork> b;
     for (int i = 0; i < nx; ++i)
         for (int j = 0; j < ny; ++j)
-            for (int k = 0; k < nz; ++k)
-                b.push_back({{at[0] + i, at[1] + j, at[2] + k}, 1.0, 1000.0});
+            for (int k = 0; k < nz; ++k) b.push_back({{at[0] + i, at[1] + j, at[2] + k}, 1.0, 1000.0});
     return b;
 }
 /// A slope with a rim of light blocks: what a scene's first cut looks like.
@@ -36,8 +33,7 @@ std::vector<BlockWork> floor_of_blocks(int n, unsigned seed)
 
 TEST(BlockGraph, LinksTheTwentySixAround)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const auto g = block_graph(box_of_blocks(3, 3, 3));
     ASSERT_EQ(g.size(), 27);
     EXPECT_EQ(g.links(13).size(), 26u);
@@ -53,8 +49,7 @@ TEST(BlockGraph, LinksTheTwentySixAround)
 
 TEST(BlockGraph, WrapsPeriodicAxesAndSumsEqualBlocks)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     auto blocks = box_of_blocks(4, 1, 1);
     blocks.push_back({{2, 0, 0}, 0.5, 10.0});
     BlockGrid grid;
@@ -69,8 +64,7 @@ TEST(BlockGraph, WrapsPeriodicAxesAndSumsEqualBlocks)
 
 TEST(BlockGraph, RefusesNonsense)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const std::vector<BlockWork> negative{{{0, 0, 0}, -1.0, 1.0}}, far{{{block_limit, 0, 0}, 1.0, 1.0}};
     EXPECT_THROW(block_graph(negative), Broken);
     EXPECT_THROW(block_graph(far), Broken);
@@ -78,8 +72,7 @@ TEST(BlockGraph, RefusesNonsense)
 
 TEST(Hilbert, CurveVisitsEveryPointAndStepsByOne)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const int bits = 3, n = 1 << bits;
     std::vector<Block> at(std::size_t(n * n * n));
     std::set<std::uint64_t> seen;
@@ -94,8 +87,7 @@ TEST(Hilbert, CurveVisitsEveryPointAndStepsByOne)
     EXPECT_EQ(seen.size(), at.size());
     for (std::size_t h = 1; h < at.size(); ++h) {
         int step = 0;
-        for (int a = 0; a < 3; ++a)
-            step += std::abs(at[h][a] - at[h - 1][a]);
+        for (int a = 0; a < 3; ++a) step += std::abs(at[h][a] - at[h - 1][a]);
         EXPECT_EQ(step, 1);
     }
 }
@@ -110,22 +102,19 @@ void expect_complete(const BlockGraph& g, const std::vector<int>& part, int part
         ++count[p];
     }
     int used = 0;
-    for (const int c : count)
-        used += c > 0;
+    for (const int c : count) used += c > 0;
     EXPECT_EQ(used, std::min(parts, g.size()));
 }
 
 TEST(Partition, IsEvenAndBeatsTheCurve)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     struct Case {
         std::vector<BlockWork> blocks;
         int parts;
     };
-    const Case cases[] = {{box_of_blocks(12, 12, 12), 16}, {box_of_blocks(12, 12, 12), 7},
-                          {box_of_blocks(40, 40, 1), 24},  {floor_of_blocks(40, 1), 2},
-                          {floor_of_blocks(40, 2), 64},    {floor_of_blocks(24, 3), 13}};
+    const Case cases[] = {{box_of_blocks(12, 12, 12), 16}, {box_of_blocks(12, 12, 12), 7}, {box_of_blocks(40, 40, 1), 24},
+                          {floor_of_blocks(40, 1), 2},     {floor_of_blocks(40, 2), 64},   {floor_of_blocks(24, 3), 13}};
     for (const auto& c : cases) {
         const auto g = block_graph(c.blocks);
         const auto part = partition(g, c.parts);
@@ -142,8 +131,7 @@ TEST(Partition, IsEvenAndBeatsTheCurve)
 
 TEST(Partition, CutsABarAcross)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const auto g = block_graph(box_of_blocks(32, 4, 4));
     const auto r = describe(g, partition(g, 4), 4);
     EXPECT_LE(r.imbalance, 1.03);
@@ -153,16 +141,14 @@ TEST(Partition, CutsABarAcross)
 
 TEST(Partition, HandlesEveryOddCase)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     EXPECT_TRUE(partition(block_graph({}), 5).empty());
     for (const Method m : {Method::Metis, Method::Hilbert}) {
         auto two = box_of_blocks(5, 5, 5);
         const auto far = box_of_blocks(5, 5, 5, {1000, -1000, 3});
         two.insert(two.end(), far.begin(), far.end());
         auto idle = box_of_blocks(6, 6, 1);
-        for (auto& b : idle)
-            b.work = 0;
+        for (auto& b : idle) b.work = 0;
         auto one_heavy = box_of_blocks(6, 6, 2);
         one_heavy[17].work = 1e6;
         for (const auto& blocks : {two, idle, one_heavy, box_of_blocks(1, 1, 1), box_of_blocks(3, 1, 1)})
@@ -175,8 +161,7 @@ TEST(Partition, HandlesEveryOddCase)
 
 TEST(Partition, KeepsLabels)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const auto g = block_graph(floor_of_blocks(40, 4));
     const int parts = 16;
     const auto before = partition(g, parts);
@@ -185,22 +170,19 @@ TEST(Partition, KeepsLabels)
     std::iota(name.begin(), name.end(), 0);
     std::shuffle(name.begin(), name.end(), std::mt19937(5));
     std::vector<int> previous;
-    for (const int p : before)
-        previous.push_back(name[p]);
+    for (const int p : before) previous.push_back(name[p]);
     EXPECT_EQ(partition(g, parts, Method::Metis, &previous), previous);
     // A block that is new does not disturb.
     previous[7] = -1;
     const auto after = partition(g, parts, Method::Metis, &previous);
     int same = 0;
-    for (int b = 0; b < g.size(); ++b)
-        same += after[b] == previous[b];
+    for (int b = 0; b < g.size(); ++b) same += after[b] == previous[b];
     EXPECT_EQ(same, g.size() - 1);
 }
 
 TEST(CutReport, CountsGhostsOfAPlainCut)
 {
-    if (world().rank() != 0)
-        return;
+    if (world().rank() != 0) return;
     const auto g = block_graph(box_of_blocks(2, 1, 1));
     const std::vector<int> part{0, 1};
     const auto r = describe(g, part, 2);
@@ -222,17 +204,15 @@ TEST(Domain, AgreesOnEveryOwner)
     const auto blocks = floor_of_blocks(24, 6);
     std::vector<BlockWork> mine;
     for (std::size_t k = 0; k < blocks.size(); ++k)
-        if (int(k) % size == rank)
-            mine.push_back(blocks[k]);
+        if (int(k) % size == rank) mine.push_back(blocks[k]);
     Domain domain(world(), {0.0, 0.0, 0.0}, {0.5, 0.5, 0.25}, {false, true, false}, {0, 0, 0}, {0, 16, 0});
     EXPECT_THROW(domain.owner_of(Block{0, 0, 0}), Broken);
     const CutReport r = domain.cut(mine);
     EXPECT_EQ(r.blocks, int(blocks.size()));
     EXPECT_LE(r.imbalance, 1.05);
     for (const auto& b : blocks)
-        EXPECT_EQ(
-            domain.owner_of(b.block),
-            domain.owner_of(Vector{b.block[0] * 0.5 + 0.1, b.block[1] * 0.5 + 0.1, b.block[2] * 0.25 + 0.1}));
+        EXPECT_EQ(domain.owner_of(b.block),
+                  domain.owner_of(Vector{b.block[0] * 0.5 + 0.1, b.block[1] * 0.5 + 0.1, b.block[2] * 0.25 + 0.1}));
     std::mt19937 random(7);
     std::vector<int> owners;
     for (int k = 0; k < 2000; ++k) {
@@ -248,8 +228,7 @@ TEST(Domain, AgreesOnEveryOwner)
             int most = 0, sum = 0;
             for (int a = 0; a < 3; ++a) {
                 int d = std::abs(domain.blocks()[c][a] - b[a]);
-                if (a == 1)
-                    d %= 32, d = std::min(d, 32 - d);
+                if (a == 1) d %= 32, d = std::min(d, 32 - d);
                 most = std::max(most, d), sum += d * d;
             }
             best = std::min(best, {most, sum, c});
@@ -257,16 +236,13 @@ TEST(Domain, AgreesOnEveryOwner)
         EXPECT_EQ(owners.back(), domain.owners()[std::get<2>(best)]);
     }
     const auto all = world().allgather(std::span<const int>(owners));
-    for (int q = 0; q < size; ++q)
-        EXPECT_TRUE(
-            std::equal(owners.begin(), owners.end(), all.begin() + std::ptrdiff_t(q * owners.size())));
+    for (int q = 0; q < size; ++q) EXPECT_TRUE(std::equal(owners.begin(), owners.end(), all.begin() + std::ptrdiff_t(q * owners.size())));
 
     // Cut again from where everything is now: nothing moves.
     const std::vector<int> before(domain.owners().begin(), domain.owners().end());
     mine.clear();
     for (const auto& b : blocks)
-        if (domain.owner_of(b.block) == rank)
-            mine.push_back(b);
+        if (domain.owner_of(b.block) == rank) mine.push_back(b);
     domain.cut(mine);
     EXPECT_EQ(before, std::vector<int>(domain.owners().begin(), domain.owners().end()));
 }
@@ -281,8 +257,7 @@ TEST(Domain, RefusesWhatItCannotCut)
     // A rank with nonsense: all ranks hear of it.
     Domain e(world(), {}, {0.5, 0.5, 0.5}, {false, false, false}, {}, {});
     std::vector<BlockWork> mine;
-    if (world().rank() == world().size() - 1)
-        mine.push_back({{0, 0, 0}, NAN, 1.0});
+    if (world().rank() == world().size() - 1) mine.push_back({{0, 0, 0}, NAN, 1.0});
     EXPECT_THROW(e.cut(mine), Broken);
     // No soil anywhere.
     e.cut({});

@@ -12,14 +12,12 @@
 using namespace kuzure;
 using testing::HasSubstr;
 
-namespace
-{
+namespace {
 
 const Alone alone;
 
-class CheckpointTest : public testing::Test
-{
-  protected:
+class CheckpointTest : public testing::Test {
+protected:
     void SetUp() override
     {
         char name[] = "/tmp/kuzure_checkpoint_XXXXXX";
@@ -33,8 +31,7 @@ class CheckpointTest : public testing::Test
 Particles some(Index n, unsigned seed)
 {
     Particles p;
-    p.require(field::velocity, field::stress, field::density, field::half_velocity, field::origin,
-              field::soil);
+    p.require(field::velocity, field::stress, field::density, field::half_velocity, field::origin, field::soil);
     p.resize(n);
     std::mt19937_64 random(seed);
     p.for_each_present([&](auto f) {
@@ -55,8 +52,7 @@ bool same_bits(const Particles& a, const Particles& b)
     a.for_each_present([&](auto f) {
         same = same && b.has(f);
         for (int c = 0; same && c < f.components; ++c)
-            same = std::memcmp(a[f].column[c], b[f].column[c],
-                               sizeof(a[f].column[c][0]) * std::size_t(a.size())) == 0;
+            same = std::memcmp(a[f].column[c], b[f].column[c], sizeof(a[f].column[c][0]) * std::size_t(a.size())) == 0;
     });
     return same;
 }
@@ -106,16 +102,14 @@ TEST_F(CheckpointTest, KeepsTwoGenerationsAndFallsBack)
 {
     const auto quiet = [](const std::string& s) { ADD_FAILURE() << s; };
     EXPECT_FALSE(io::newest_good(alone, dir, quiet));
-    for (int k = 0; k < 3; ++k)
-        io::write_checkpoint(alone, dir, some(100, unsigned(k)), "hash", std::to_string(k));
+    for (int k = 0; k < 3; ++k) io::write_checkpoint(alone, dir, some(100, unsigned(k)), "hash", std::to_string(k));
     auto good = io::newest_good(alone, dir, quiet);
     ASSERT_TRUE(good);
     EXPECT_EQ(good->header, "2");
 
     std::vector<std::string> said;
     const auto listen = [&](const std::string& s) { said.push_back(s); };
-    std::filesystem::resize_file(dir / "checkpoint.h5",
-                                 std::filesystem::file_size(dir / "checkpoint.h5") / 2);
+    std::filesystem::resize_file(dir / "checkpoint.h5", std::filesystem::file_size(dir / "checkpoint.h5") / 2);
     good = io::newest_good(alone, dir, listen);
     ASSERT_TRUE(good);
     EXPECT_EQ(good->header, "1");
@@ -129,8 +123,7 @@ TEST_F(CheckpointTest, KeepsTwoGenerationsAndFallsBack)
 
 TEST_F(CheckpointTest, ACrashBetweenTheRenamesLosesNothing)
 {
-    for (int k = 0; k < 2; ++k)
-        io::write_checkpoint(alone, dir, some(100, unsigned(k)), "hash", std::to_string(k));
+    for (int k = 0; k < 2; ++k) io::write_checkpoint(alone, dir, some(100, unsigned(k)), "hash", std::to_string(k));
     std::filesystem::rename(dir / "checkpoint.h5", dir / "checkpoint.h5.tmp");
     const auto good = io::newest_good(alone, dir, [](const std::string& s) { ADD_FAILURE() << s; });
     ASSERT_TRUE(good);

@@ -13,8 +13,7 @@ using namespace kuzure;
 using namespace kuzure::scene;
 using ::testing::HasSubstr;
 
-namespace
-{
+namespace {
 
 const double far = std::numeric_limits<double>::infinity();
 const Box everywhere{{-far, -far, -far}, {far, far, far}};
@@ -26,10 +25,8 @@ Scene made(double spacing, std::vector<Shape> bodies, std::vector<Shape> walls =
     s.space.spacing = spacing;
     s.time.end = 1;
     s.soils.resize(1);
-    for (auto& shape : bodies)
-        s.bodies.push_back({0, shape});
-    for (auto& shape : walls)
-        s.walls.push_back({shape});
+    for (auto& shape : bodies) s.bodies.push_back({0, shape});
+    for (auto& shape : walls) s.walls.push_back({shape});
     return s;
 }
 
@@ -42,17 +39,13 @@ struct Particle {
 std::vector<Particle> soil_in(const Filling& filling, const Box& region)
 {
     std::vector<Particle> all;
-    filling.for_each_soil_in(region, [&](std::int64_t id, Vector x, int body) {
-        all.push_back({id, x, body});
-    });
+    filling.for_each_soil_in(region, [&](std::int64_t id, Vector x, int body) { all.push_back({id, x, body}); });
     return all;
 }
 std::vector<Particle> walls_in(const Filling& filling, const Box& region)
 {
     std::vector<Particle> all;
-    filling.for_each_wall_in(region, [&](std::int64_t id, Vector x, int wall) {
-        all.push_back({id, x, wall});
-    });
+    filling.for_each_wall_in(region, [&](std::int64_t id, Vector x, int wall) { all.push_back({id, x, wall}); });
     return all;
 }
 bool within(const Box& b, Vector x, int dimensions)
@@ -68,16 +61,13 @@ Scene mixed(int dimensions)
 {
     const Box cube{{-1.03, -1.01, 0.02}, {-0.03, -0.51, 1.02}};
     std::vector<Shape> bodies{cube, Sphere{{0.5, 0.5, 2.1}, 0.43}, slope, comb};
-    if (dimensions == 3)
-        bodies.push_back(Cylinder{{3, 3, 0.1}, 0.55, 0.72});
+    if (dimensions == 3) bodies.push_back(Cylinder{{3, 3, 0.1}, 0.55, 0.72});
     return made(0.1, bodies, {Box{{-2, -2, -0.4}, {5, 5, 0}}}, dimensions);
 }
 
 } // namespace
 
-class Fill : public ::testing::TestWithParam<int>
-{
-};
+class Fill : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Dimensions, Fill, ::testing::Values(2, 3));
 
 TEST_P(Fill, HoldsExactlyTheLatticePointsInside)
@@ -96,10 +86,8 @@ TEST_P(Fill, HoldsExactlyTheLatticePointsInside)
         for (int kz = -20; kz < 60; ++kz)
             for (int ky = dimensions == 2 ? 0 : -20; ky < (dimensions == 2 ? 1 : 60); ++ky)
                 for (int kx = -20; kx < 60; ++kx) {
-                    const Vector x{o.x + (kx + 0.5) * dx, dimensions == 2 ? 0.0 : o.y + (ky + 0.5) * dx,
-                                   o.z + (kz + 0.5) * dx};
-                    if (signed_distance(shape, x, dimensions) >= -1e-9 * dx)
-                        continue;
+                    const Vector x{o.x + (kx + 0.5) * dx, dimensions == 2 ? 0.0 : o.y + (ky + 0.5) * dx, o.z + (kz + 0.5) * dx};
+                    if (signed_distance(shape, x, dimensions) >= -1e-9 * dx) continue;
                     ASSERT_LT(at, all.size());
                     ASSERT_EQ(all[at++], (Particle{expected_id++, x, int(b)}));
                 }
@@ -134,21 +122,15 @@ TEST_P(Fill, RegionsAreExactAndCountedWithoutAVisit)
     std::mt19937 random(5);
     std::uniform_real_distribution<double> u(-2.5, 5);
     for (int k = 0; k < 300; ++k) {
-        const auto pick = [&] {
-            return k % 3 ? u(random) : std::round(u(random) * 20) / 20;
-        }; // a third on the lattice
+        const auto pick = [&] { return k % 3 ? u(random) : std::round(u(random) * 20) / 20; }; // a third on the lattice
         Box r{{pick(), pick(), pick()}, {pick(), pick(), pick()}};
-        if (k % 7 == 0)
-            r.low.x = -far;
-        if (k % 11 == 0)
-            r.high.z = far;
+        if (k % 7 == 0) r.low.x = -far;
+        if (k % 11 == 0) r.high.z = far;
         std::vector<Particle> expected, expected_walls;
         for (const auto& p : all)
-            if (within(r, p.x, GetParam()))
-                expected.push_back(p);
+            if (within(r, p.x, GetParam())) expected.push_back(p);
         for (const auto& p : walls)
-            if (within(r, p.x, GetParam()))
-                expected_walls.push_back(p);
+            if (within(r, p.x, GetParam())) expected_walls.push_back(p);
         EXPECT_EQ(soil_in(filling, r), expected);
         EXPECT_EQ(filling.soil_count_in(r), std::int64_t(expected.size()));
         EXPECT_EQ(walls_in(filling, r), expected_walls);
@@ -181,24 +163,20 @@ TEST_P(Fill, BoundsAreThoseOfTheParticles)
         b.low = {std::min(b.low.x, x.x), std::min(b.low.y, x.y), std::min(b.low.z, x.z)};
         b.high = {std::max(b.high.x, x.x), std::max(b.high.y, x.y), std::max(b.high.z, x.z)};
     };
-    for (const auto& p : soil_in(filling, everywhere))
-        widen(soil, p.x);
+    for (const auto& p : soil_in(filling, everywhere)) widen(soil, p.x);
     EXPECT_EQ(filling.soil_bounds(), soil);
-    for (const auto& p : walls_in(filling, everywhere))
-        widen(soil, p.x);
+    for (const auto& p : walls_in(filling, everywhere)) widen(soil, p.x);
     EXPECT_EQ(filling.bounds(), soil);
 }
 
 TEST(Fill, CountsOfTheHirataScenes)
 {
-    const std::pair<const char*, std::array<std::int64_t, 2>> cases[] = {
-        {"hirata_52", {140'608, 186'624}},
-        {"hirata_104", {1'124'864, 746'496}},
-        {"hirata_208", {8'998'912, 2'985'984}},
-        {"quickstart", {8'000, 40'000}}};
+    const std::pair<const char*, std::array<std::int64_t, 2>> cases[] = {{"hirata_52", {140'608, 186'624}},
+                                                                         {"hirata_104", {1'124'864, 746'496}},
+                                                                         {"hirata_208", {8'998'912, 2'985'984}},
+                                                                         {"quickstart", {8'000, 40'000}}};
     for (const auto& [name, counts] : cases) {
-        const Filling filling(
-            io::read_scene(std::string(KUZURE_SOURCE_DIR "/jobs/scenes/") + name + ".toml"));
+        const Filling filling(io::read_scene(std::string(KUZURE_SOURCE_DIR "/jobs/scenes/") + name + ".toml"));
         EXPECT_EQ(filling.soil_count(), counts[0]) << name;
         EXPECT_EQ(filling.wall_count(), counts[1]) << name;
     }
@@ -221,8 +199,7 @@ TEST(Fill, TwelveMillionParticlesAreListedInUnderASecond)
 TEST(Fill, LargeBodiesInsideConcaveWallsAreCheckedQuickly)
 {
     // A trough whose bounds hold 8 million particles of soil.
-    const Polygon trough{{{-1, -1}, {21, -1}, {21, 20}, {20, 20}, {20, 0}, {0, 0}, {0, 20}, {-1, 20}},
-                         {0, 20}};
+    const Polygon trough{{{-1, -1}, {21, -1}, {21, 20}, {20, 20}, {20, 0}, {0, 0}, {0, 20}, {-1, 20}}, {0, 20}};
     const auto start = std::chrono::steady_clock::now();
     EXPECT_TRUE(Filling::problems(made(0.1, {Box{{0, 0, 0}, {20, 20, 20}}}, {trough})).empty());
     EXPECT_FALSE(Filling::problems(made(0.1, {Sphere{{10, 10, 9.5}, 10}}, {trough})).empty());
@@ -232,8 +209,7 @@ TEST(Fill, LargeBodiesInsideConcaveWallsAreCheckedQuickly)
 TEST(Fill, LongAndThinShapesAreFilledQuickly)
 {
     const auto start = std::chrono::steady_clock::now();
-    const Lattice wedge(Polygon{{{1e6, 0}, {4, 0}, {4, 1}}, {0, 1}}, 0.1, 3),
-        disc(Cylinder{{0, 0, 0}, 5e3, 0.2}, 0.1, 3);
+    const Lattice wedge(Polygon{{{1e6, 0}, {4, 0}, {4, 1}}, {0, 1}}, 0.1, 3), disc(Cylinder{{0, 0, 0}, 5e3, 0.2}, 0.1, 3);
     EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 2);
     EXPECT_NEAR(double(wedge.size()), (1e6 - 4) / 2 * 1e3, 1e-6 * 5e8);
     EXPECT_NEAR(double(disc.size()), 3.14159265 * 5e3 * 5e3 * 0.2 * 1e3, 1e-5 * 1.6e10);
@@ -242,9 +218,7 @@ TEST(Fill, LongAndThinShapesAreFilledQuickly)
 TEST(Fill, TouchingIsAllowedOverlappingIsNot)
 {
     const Box cube{{0, 0, 0}, {1, 1, 1}};
-    const auto problems = [&](Shape other, int dimensions = 3) {
-        return Filling::problems(made(0.1, {cube}, {other}, dimensions)).size();
-    };
+    const auto problems = [&](Shape other, int dimensions = 3) { return Filling::problems(made(0.1, {cube}, {other}, dimensions)).size(); };
     EXPECT_EQ(problems(Box{{1, 0, 0}, {2, 1, 1}}), 0u);
     EXPECT_EQ(problems(Box{{-1, -1, -0.4}, {2, 2, 0}}), 0u);
     EXPECT_EQ(problems(Box{{1, 1, 1}, {2, 2, 2}}), 0u);
@@ -264,8 +238,7 @@ TEST(Fill, TouchingIsAllowedOverlappingIsNot)
     const Filling filling(made(0.1, {cube}, {Sphere{{0.53, 0.48, 1.571}, 0.57}}));
     double nearest = far;
     for (const auto& w : walls_in(filling, everywhere))
-        for (const auto& s : soil_in(filling, everywhere))
-            nearest = std::min(nearest, length(w.x - s.x));
+        for (const auto& s : soil_in(filling, everywhere)) nearest = std::min(nearest, length(w.x - s.x));
     EXPECT_GE(nearest, 0.05);
 }
 
@@ -280,23 +253,20 @@ TEST(Fill, ProblemsAreNamed)
         return std::string("accepted");
     };
     const Box cube{{0, 0, 0}, {1, 1, 1}};
-    EXPECT_THAT(
-        text(made(0.1, {Box{{0, 0, 0}, {1, 1.05, 1}}})),
-        HasSubstr("body.0.box: expected a whole number of spacings (0.1 m) a side, found 10.5 along y"));
+    EXPECT_THAT(text(made(0.1, {Box{{0, 0, 0}, {1, 1.05, 1}}})),
+                HasSubstr("body.0.box: expected a whole number of spacings (0.1 m) a side, found 10.5 along y"));
     EXPECT_EQ(text(made(0.1, {Box{{0, 0, 0}, {1, 1.05, 1}}}, {}, 2)), "accepted");
     EXPECT_EQ(text(made(0.1, {Box{{0, 7, 0}, {1, 3, 1}}}, {}, 2)), "accepted");
     EXPECT_EQ(text(made(0.1, {Box{{0, 0, 0}, {1, 1 + 5e-8, 1}}})), "accepted");
-    EXPECT_THAT(text(made(0.1, {cube}, {Sphere{{3, 3, 3}, 0.01}})),
-                HasSubstr("wall.0.sphere: expected particles strictly inside"));
+    EXPECT_THAT(text(made(0.1, {cube}, {Sphere{{3, 3, 3}, 0.01}})), HasSubstr("wall.0.sphere: expected particles strictly inside"));
     EXPECT_THAT(text(made(1e-5, {Box{{0, 0, 0}, {1e3, 1e3, 1e3}}})), HasSubstr("computer can hold"));
     EXPECT_THAT(text(made(0.1, {cube, cube})), HasSubstr("an overlap of body.1 with body.0 by 1 m"));
 }
 
 TEST(Fill, ShapesThatMissEveryLatticePointAreEmpty)
 {
-    for (const Shape& shape :
-         {Shape{Cylinder{{0, 0, 0.06}, 1, 0.08}}, Shape{Polygon{{{0, 0}, {1, 0}, {0, 1}}, {0.06, 0.14}}},
-          Shape{Polygon{{{0, 0.06}, {1, 0.06}, {1, 0.14}}, {0, 1}}}, Shape{Sphere{{0, 0, 0}, 0.05}}}) {
+    for (const Shape& shape : {Shape{Cylinder{{0, 0, 0.06}, 1, 0.08}}, Shape{Polygon{{{0, 0}, {1, 0}, {0, 1}}, {0.06, 0.14}}},
+                               Shape{Polygon{{{0, 0.06}, {1, 0.06}, {1, 0.14}}, {0, 1}}}, Shape{Sphere{{0, 0, 0}, 0.05}}}) {
         const Lattice lattice(shape, 0.1, 3);
         EXPECT_EQ(lattice.size(), 0);
         EXPECT_EQ(lattice.count_in(everywhere), 0);

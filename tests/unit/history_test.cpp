@@ -12,14 +12,12 @@ using namespace kuzure;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-namespace
-{
+namespace {
 
 const Alone alone;
 
-class HistoryTest : public testing::Test
-{
-  protected:
+class HistoryTest : public testing::Test {
+protected:
     void SetUp() override
     {
         char name[] = "/tmp/kuzure_history_XXXXXX";
@@ -51,12 +49,11 @@ TEST_F(HistoryTest, HasHeaderUnitsAndRowsThatReadBack)
         h.append(row(3));
         EXPECT_EQ(h.last_time(), row(3).time);
     }
-    EXPECT_EQ(io::read_text(file),
-              "time,step,dt,kinetic,potential,elastic,plastic,viscous,wall,damping,residual,max_speed,height,"
-              "front_min_x,front_max_x,front_min_y,front_max_y\n"
-              "# s,1,s,J,J,J,J,J,J,J,1,m/s,m,m,m,m,m\n"
-              "0,0,0,0.3333333333333333,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n"
-              "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n");
+    EXPECT_EQ(io::read_text(file), "time,step,dt,kinetic,potential,elastic,plastic,viscous,wall,damping,residual,max_speed,height,"
+                                   "front_min_x,front_max_x,front_min_y,front_max_y\n"
+                                   "# s,1,s,J,J,J,J,J,J,J,1,m/s,m,m,m,m,m\n"
+                                   "0,0,0,0.3333333333333333,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n"
+                                   "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n");
 }
 
 TEST_F(HistoryTest, ARestartLeavesNeitherGapNorDouble)
@@ -64,16 +61,14 @@ TEST_F(HistoryTest, ARestartLeavesNeitherGapNorDouble)
     std::string whole;
     {
         io::History h(alone, file, 2);
-        for (int k = 0; k < 10; ++k)
-            h.append(row(k));
+        for (int k = 0; k < 10; ++k) h.append(row(k));
         whole = io::read_text(file);
     }
     for (const int from : {0, 4, 9}) {
         std::ofstream(file, std::ios::app) << "9.9,99,0.1,0."; // torn by a crash
         io::History h(alone, file, 2, row(from).time);
         EXPECT_EQ(h.last_time(), row(from).time);
-        for (int k = from + 1; k < 10; ++k)
-            h.append(row(k));
+        for (int k = from + 1; k < 10; ++k) h.append(row(k));
         h.sync();
         EXPECT_EQ(io::read_text(file), whole) << from;
     }
@@ -104,9 +99,8 @@ TEST_F(HistoryTest, SummaryIsJsonWithTheNamesOfTheInterface)
     io::write_summary(alone, dir / "summary.json", s);
     const auto j = nlohmann::json::parse(io::read_text(dir / "summary.json"));
     for (const char* key :
-         {"status", "exit_code", "scene_hash", "version", "ranks", "threads", "precision", "soil_particles",
-          "wall_particles", "steps", "time", "wall_seconds", "pairs", "seconds_per_step",
-          "particle_steps_per_second", "energy", "effects", "state_hash"})
+         {"status", "exit_code", "scene_hash", "version", "ranks", "threads", "precision", "soil_particles", "wall_particles", "steps",
+          "time", "wall_seconds", "pairs", "seconds_per_step", "particle_steps_per_second", "energy", "effects", "state_hash"})
         EXPECT_TRUE(j.contains(key)) << key;
     EXPECT_EQ(j["energy"]["kinetic"], 1.5);
     EXPECT_TRUE(j["energy"]["residual"].is_null());
@@ -141,8 +135,7 @@ TEST_F(HistoryTest, AResultDirectoryIsNeverOverwritten)
     EXPECT_EQ(ResultDirectory(alone, results, Existing::GoOn).moved_to(), "");
     EXPECT_EQ(io::read_text(results / "history.csv"), "old");
 
-    EXPECT_EQ(ResultDirectory(alone, results.string() + "/", Existing::MoveAside).moved_to(),
-              results.string() + ".old-1");
+    EXPECT_EQ(ResultDirectory(alone, results.string() + "/", Existing::MoveAside).moved_to(), results.string() + ".old-1");
     EXPECT_EQ(io::read_text(results.string() + ".old-1/history.csv"), "old");
     EXPECT_FALSE(std::filesystem::exists(results / "history.csv"));
     EXPECT_EQ(ResultDirectory(alone, results, Existing::MoveAside).moved_to(), results.string() + ".old-2");

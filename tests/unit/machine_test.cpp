@@ -6,10 +6,8 @@
 #include <gtest/gtest.h>
 #include <iterator>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 namespace fs = std::filesystem;
 
@@ -17,8 +15,7 @@ struct Folder {
     Folder()
     {
         std::string name = (fs::temp_directory_path() / "kuzure-machine-XXXXXX").string();
-        if (!mkdtemp(name.data()))
-            throw std::runtime_error("no temporary directory");
+        if (!mkdtemp(name.data())) throw std::runtime_error("no temporary directory");
         path = name;
     }
     ~Folder() { fs::remove_all(path); }
@@ -67,8 +64,7 @@ TEST(Machine, MeasuredOnceAndKept)
     EXPECT_LT(first.gbytes_one, 2000);
     EXPECT_GT(first.gflops_double_all, 0.3 * first.gflops_double_one);
     EXPECT_GT(first.gbytes_all, 0.3 * first.gbytes_one);
-    EXPECT_EQ(this_machine("test set", 2, cache.path / "made" / "on the way"), first)
-        << "kept to the last digit";
+    EXPECT_EQ(this_machine("test set", 2, cache.path / "made" / "on the way"), first) << "kept to the last digit";
 }
 
 TEST(Machine, WhatWasKeptIsUsedAndWhatIsSpoiltIsNot)

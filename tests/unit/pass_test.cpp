@@ -66,7 +66,8 @@ Reference by_the_book(const Cloud& c)
             Stress bracket = p[field::stress][i] + p[field::stress][j];
             if (s.effects.viscosity && dot(v, r) < 0) {
                 const double mu = h * dot(v, r) / (d * d + 0.01 * h * h), sound = 0.5 * (mi.sound_speed + mj.sound_speed);
-                const double Pi = (-s.effects.viscosity->alpha * sound * mu + s.effects.viscosity->beta * mu * mu) / (0.5 * (rho_i + rho_j));
+                const double Pi =
+                    (-s.effects.viscosity->alpha * sound * mu + s.effects.viscosity->beta * mu * mu) / (0.5 * (rho_i + rho_j));
                 bracket = plus_isotropic(bracket, -rho_i * rho_j * Pi);
             }
             if (s.effects.artificial_stress) {
@@ -114,10 +115,10 @@ Scene with(scene::Kernel kernel, bool viscous, double beta, bool tensile, int di
 const std::vector<Scene>& scenes()
 {
     using scene::Kernel;
-    static const std::vector<Scene> all{
-        with(Kernel::CubicSpline, false, 0, false),  with(Kernel::CubicSpline, true, 0, false), with(Kernel::WendlandC2, true, 0, false),
-        with(Kernel::CubicSpline, true, 0.5, true),  with(Kernel::WendlandC2, true, 0.2, true), with(Kernel::WendlandC4, true, 0.2, true),
-        with(Kernel::CubicSpline, true, 0, false, 2)};
+    static const std::vector<Scene> all{with(Kernel::CubicSpline, false, 0, false),  with(Kernel::CubicSpline, true, 0, false),
+                                        with(Kernel::WendlandC2, true, 0, false),    with(Kernel::CubicSpline, true, 0.5, true),
+                                        with(Kernel::WendlandC2, true, 0.2, true),   with(Kernel::WendlandC4, true, 0.2, true),
+                                        with(Kernel::CubicSpline, true, 0, false, 2)};
     return all;
 }
 /// Arrangements: 0 lattice, 1 jitter 0.3, 2 disorder, 3 with lonely, coincident and tensile particles.
@@ -128,7 +129,7 @@ Cloud arrangement(int kind, const Scene& s)
     if (kind == 3) {
         auto x = c.particles[field::position];
         x.set(3, Vector{50, s.dimensions == 2 ? 0.0 : 50, 50}); // lonely
-        x.set(5, x[4]);                                          // two on one point
+        x.set(5, x[4]);                                         // two on one point
         for (Index i = 20; i < 120; ++i) c.particles[field::stress].set(i, Stress{300, -50, 20, 10, -40, 5});
     }
     return c;

@@ -9,10 +9,8 @@
 #include <stdexcept>
 #include <thread>
 
-namespace kuzure
-{
-namespace
-{
+namespace kuzure {
+namespace {
 
 using namespace std::chrono_literals;
 
@@ -80,18 +78,15 @@ TEST(Timers, CostNextToNothing)
     double best = 1;
     for (int repeat = 0; repeat < 20; ++repeat) {
         const auto start = std::chrono::steady_clock::now();
-        for (int k = 0; k < 1000; ++k)
-            t.timed(Phase::Reduce, [] {});
-        best = std::min(
-            best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / 1000);
+        for (int k = 0; k < 1000; ++k) t.timed(Phase::Reduce, [] {});
+        best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / 1000);
     }
     EXPECT_LT(best, 2e-6); // a step has some ten phases and takes milliseconds
 }
 
 /// A team of three as rank 0 sees it, whose others have twice and three times what this rank has.
-class ThreeAlike final : public Team
-{
-  public:
+class ThreeAlike final : public Team {
+public:
     int rank() const override { return 0; }
     int size() const override { return 3; }
     void barrier() const override {}
@@ -106,11 +101,10 @@ class ThreeAlike final : public Team
     std::vector<std::vector<std::byte>> gather(std::span<const std::byte>, int) const override { return {}; }
     void* native() const override { return nullptr; }
 
-  private:
+private:
     template <class T> static void scale(std::span<T> v, int by)
     {
-        for (T& x : v)
-            x *= by;
+        for (T& x : v) x *= by;
     }
 };
 
@@ -147,8 +141,7 @@ TEST(PhaseReport, OverTheRanks)
     EXPECT_DOUBLE_EQ(interior.gflops(), 6 * 12e6 / (3 * mine) * 1e-9);
     EXPECT_DOUBLE_EQ(report.pair_loop.intensity(), 2);
     double shares = 0;
-    for (const auto& row : report.rows)
-        shares += row.share;
+    for (const auto& row : report.rows) shares += row.share;
     EXPECT_NEAR(shares, 1, 1e-12);
     EXPECT_NEAR(report.total.share, 1, 1e-12);
     EXPECT_NEAR(report.total.mean, 2 * t.total(), 1e-12);
@@ -180,8 +173,7 @@ TEST(PhaseReport, TableIsAligned)
     EXPECT_THAT(text, testing::HasSubstr("a processor, avx2"));
     EXPECT_THAT(text, testing::Not(testing::HasSubstr("picture")));
     std::set<std::size_t> ends;
-    for (std::size_t at = 0; (at = text.find("% ", at)) != text.npos; ++at)
-        ends.insert(at - text.rfind('\n', at));
+    for (std::size_t at = 0; (at = text.find("% ", at)) != text.npos; ++at) ends.insert(at - text.rfind('\n', at));
     EXPECT_EQ(ends.size(), 1u) << text;
 }
 

@@ -7,8 +7,7 @@
 
 using namespace kuzure;
 
-namespace
-{
+namespace {
 
 const Alone alone;
 
@@ -33,9 +32,8 @@ Image load(const io::Path& file)
     return r;
 }
 
-class PictureTest : public testing::Test
-{
-  protected:
+class PictureTest : public testing::Test {
+protected:
     void SetUp() override
     {
         char name[] = "/tmp/kuzure_picture_XXXXXX";
@@ -50,8 +48,7 @@ class PictureTest : public testing::Test
             p[field::origin].set(i, x);
         }
         for (int a = -20; a < 28; ++a)
-            for (int b = -20; b < 28; ++b)
-                walls.position.push_back({(a + 0.5) * d, (b + 0.5) * d, -0.5 * d});
+            for (int b = -20; b < 28; ++b) walls.position.push_back({(a + 0.5) * d, (b + 0.5) * d, -0.5 * d});
         walls.id.resize(walls.size());
         walls.density.resize(walls.size());
     }
@@ -59,8 +56,7 @@ class PictureTest : public testing::Test
     Image draw(scene::View view, scene::Color color, int dimensions = 3)
     {
         const auto box = io::soil_extent(alone, p);
-        io::write_picture(alone, dir / "p.png", p, walls,
-                          {{view, color}, dimensions, box.low, box.high, d, "title", 0.5, {}, 800, 450});
+        io::write_picture(alone, dir / "p.png", p, walls, {{view, color}, dimensions, box.low, box.high, d, "title", 0.5, {}, 800, 450});
         return load(dir / "p.png");
     }
     const double d = 0.1;
@@ -96,20 +92,17 @@ TEST_F(PictureTest, TheFurtherTheDarker)
         const Image im = draw(scene::View::Top, scene::Color::Displacement);
         long sum = 0, n = 0;
         for (int y = 200; y < 240; ++y)
-            for (int x = 260; x < 300; ++x, ++n)
-                sum += im.at(x, y)[0];
+            for (int x = 260; x < 300; ++x, ++n) sum += im.at(x, y)[0];
         return double(sum) / double(n);
     };
     const double before = brightness();
-    for (Index i = 0; i < p.size(); ++i)
-        p[field::origin].set(i, p[field::position][i] - Vector{0.5, 0, 0});
+    for (Index i = 0; i < p.size(); ++i) p[field::origin].set(i, p[field::position][i] - Vector{0.5, 0, 0});
     EXPECT_LT(brightness(), 0.5 * before);
 }
 
 TEST_F(PictureTest, EveryColourAndNoSoilAtAll)
 {
-    for (const auto color : {scene::Color::Displacement, scene::Color::Speed, scene::Color::PlasticStrain,
-                             scene::Color::Pressure}) {
+    for (const auto color : {scene::Color::Displacement, scene::Color::Speed, scene::Color::PlasticStrain, scene::Color::Pressure}) {
         p[field::stress].set(3, Stress{-1e3, -1e3, -1e3});
         p[field::velocity].set(3, Vector{std::nan(""), 0, 0});
         draw(scene::View::Oblique, color);
@@ -132,7 +125,5 @@ TEST_F(PictureTest, TextKeepsInsideTheCanvas)
 TEST_F(PictureTest, AFailureIsAnIoFailure)
 {
     const auto box = io::soil_extent(alone, p);
-    EXPECT_THROW(io::write_picture(alone, dir / "none" / "p.png", p, walls,
-                                   {{}, 3, box.low, box.high, d, "", 0, {}, 80, 45}),
-                 IoFailed);
+    EXPECT_THROW(io::write_picture(alone, dir / "none" / "p.png", p, walls, {{}, 3, box.low, box.high, d, "", 0, {}, 80, 45}), IoFailed);
 }

@@ -16,8 +16,7 @@ using namespace kuzure;
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-namespace
-{
+namespace {
 
 const fs::path source = KUZURE_SOURCE_DIR;
 
@@ -124,20 +123,14 @@ std::string refusal(const std::string& text, std::vector<std::string> sets = {})
     return "accepted";
 }
 
-Scene parsed(const std::string& text, std::vector<std::string> sets = {})
-{
-    return io::parse_scene(text, "s.toml", sets);
-}
+Scene parsed(const std::string& text, std::vector<std::string> sets = {}) { return io::parse_scene(text, "s.toml", sets); }
 
-class BadScene : public ::testing::TestWithParam<fs::path>
-{
-};
+class BadScene : public ::testing::TestWithParam<fs::path> {};
 std::vector<fs::path> bad_scenes()
 {
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(source / "tests/scenes/bad"))
-        if (entry.path().extension() == ".toml")
-            files.push_back(entry.path());
+        if (entry.path().extension() == ".toml") files.push_back(entry.path());
     std::sort(files.begin(), files.end());
     return files;
 }
@@ -155,16 +148,13 @@ TEST_P(BadScene, IsRefusedWithItsMessage)
         FAIL() << "accepted";
     } catch (const BadInput& e) {
         const std::string message = e.what();
-        EXPECT_TRUE(std::regex_search(message, std::regex(expected)))
-            << "expected: " << expected << "\nfound:    " << message;
+        EXPECT_TRUE(std::regex_search(message, std::regex(expected))) << "expected: " << expected << "\nfound:    " << message;
         EXPECT_TRUE(message.starts_with(GetParam().string() + ":")) << message;
         const auto lines = std::count(message.begin(), message.end(), '\n') + 1;
-        EXPECT_LE(lines, GetParam().stem() == "several" ? 2 : 3) << "one mistake, many complaints:\n"
-                                                                 << message;
+        EXPECT_LE(lines, GetParam().stem() == "several" ? 2 : 3) << "one mistake, many complaints:\n" << message;
     }
 }
-INSTANTIATE_TEST_SUITE_P(Corpus, BadScene, ::testing::ValuesIn(bad_scenes()),
-                         [](const auto& info) { return info.param.stem().string(); });
+INSTANTIATE_TEST_SUITE_P(Corpus, BadScene, ::testing::ValuesIn(bad_scenes()), [](const auto& info) { return info.param.stem().string(); });
 
 TEST(SceneFile, CorpusIsLarge) { EXPECT_GE(bad_scenes().size(), 60u); }
 
@@ -173,8 +163,7 @@ TEST(SceneFile, EveryJobIsReadWithoutAWarning)
     for (const auto& entry : fs::directory_iterator(source / "jobs/scenes"))
         if (entry.path().extension() == ".toml") {
             const auto scene = io::read_scene(entry.path());
-            for (const auto& issue : scene::check(scene))
-                ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
+            for (const auto& issue : scene::check(scene)) ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
         }
 }
 
@@ -239,8 +228,7 @@ TEST(SceneFile, EveryKeyArrives)
 TEST(SceneFile, WhatIsWrittenReadsBackToTheSameScene)
 {
     std::vector<std::string> texts{least, full, least + "[effects]\nartificial_stress = \"auto\"\n"};
-    for (const auto& entry : fs::directory_iterator(source / "jobs/scenes"))
-        texts.push_back(text_of(entry.path()));
+    for (const auto& entry : fs::directory_iterator(source / "jobs/scenes")) texts.push_back(text_of(entry.path()));
     for (const auto& text : texts) {
         const auto scene = parsed(text);
         const auto written = io::write_scene(scene);
@@ -264,10 +252,9 @@ TEST(SceneFile, AnglesSurviveBitForBit)
 
 TEST(SceneFile, SetsOverride)
 {
-    const auto s =
-        parsed(least, {"space.spacing=0.05", "soil.sand.cohesion = 100", "accuracy.kernel=wendland c2",
-                       "title=42", "body.0.velocity=[1, 2, 3]", "effects.viscosity.alpha=0.3",
-                       "output.picture={view=\"top\"}", "accuracy.cfl=0.3", "accuracy.cfl=0.1"});
+    const auto s = parsed(least, {"space.spacing=0.05", "soil.sand.cohesion = 100", "accuracy.kernel=wendland c2", "title=42",
+                                  "body.0.velocity=[1, 2, 3]", "effects.viscosity.alpha=0.3", "output.picture={view=\"top\"}",
+                                  "accuracy.cfl=0.3", "accuracy.cfl=0.1"});
     EXPECT_EQ(s.space.spacing, 0.05);
     EXPECT_EQ(s.soils[0].cohesion, 100);
     EXPECT_EQ(s.accuracy.kernel, scene::Kernel::WendlandC2);
@@ -277,24 +264,19 @@ TEST(SceneFile, SetsOverride)
     EXPECT_EQ(s.output.picture->view, scene::View::Top);
     EXPECT_EQ(s.accuracy.cfl, 0.1);
     EXPECT_EQ(parsed(full, {"wall.1.surface.friction_angle=10"}).walls[1].surface, scene::Surface::Coulomb);
-    EXPECT_EQ(parsed(full, {"effects.artificial_stress=auto"}).effects.artificial_stress_decision,
-              scene::Decision::Auto);
+    EXPECT_EQ(parsed(full, {"effects.artificial_stress=auto"}).effects.artificial_stress_decision, scene::Decision::Auto);
 }
 
 TEST(SceneFile, WrongSetsAreRefused)
 {
-    EXPECT_THAT(refusal(least, {"space.spaceing=0.05"}),
-                HasSubstr("--set space.spaceing=0.05: space.spaceing: expected a known key"));
-    EXPECT_THAT(refusal(least, {"space.spacing=-1"}),
-                HasSubstr("--set space.spacing=-1: space.spacing: expected a number in m"));
-    EXPECT_THAT(refusal(least, {"space.spacing=fine"}),
-                HasSubstr("--set space.spacing=fine: space.spacing: expected a number in m"));
+    EXPECT_THAT(refusal(least, {"space.spaceing=0.05"}), HasSubstr("--set space.spaceing=0.05: space.spaceing: expected a known key"));
+    EXPECT_THAT(refusal(least, {"space.spacing=-1"}), HasSubstr("--set space.spacing=-1: space.spacing: expected a number in m"));
+    EXPECT_THAT(refusal(least, {"space.spacing=fine"}), HasSubstr("--set space.spacing=fine: space.spacing: expected a number in m"));
     EXPECT_THAT(refusal(least, {"space.spacing"}), HasSubstr("expected key.path=value"));
     EXPECT_THAT(refusal(least, {"space.spacing="}), HasSubstr("expected key.path=value"));
     EXPECT_THAT(refusal(least, {"=3"}), HasSubstr("expected key.path=value"));
     EXPECT_THAT(refusal(least, {"space..h=3"}), HasSubstr("expected key.path=value"));
-    EXPECT_THAT(refusal(least, {"body.1.velocity=[0,0,0]"}),
-                HasSubstr("expected a number from 0 to 0 after body"));
+    EXPECT_THAT(refusal(least, {"body.1.velocity=[0,0,0]"}), HasSubstr("expected a number from 0 to 0 after body"));
     EXPECT_THAT(refusal(least, {"title.x=3"}), HasSubstr("expected a key inside a table"));
     EXPECT_THAT(refusal(least, {"time.end=1\nstep=2"}), HasSubstr("time.end: expected a number"));
     EXPECT_THAT(refusal(least, {"title=\xff"}), HasSubstr("expected UTF-8"));
@@ -306,10 +288,8 @@ TEST(SceneFile, BytesThatAreNoTextAreRefused)
     EXPECT_THAT(refusal(least + "# \xC0\x80\n"), HasSubstr("expected UTF-8"));
     EXPECT_THAT(refusal(least + "# \xED\xA0\x80\n"), HasSubstr("expected UTF-8"));
     EXPECT_THAT(refusal(least + "# \xE2\x82"), HasSubstr("expected UTF-8"));
-    EXPECT_THAT(refusal("\xEF\xB9\xBF:" + least),
-                HasSubstr("s.toml:1: expected text, found the character U+FE7F"));
-    EXPECT_THAT(refusal(least + "\n\xEF\xBB\xBD"),
-                HasSubstr("s.toml:16: expected text, found the character U+FEFD"));
+    EXPECT_THAT(refusal("\xEF\xB9\xBF:" + least), HasSubstr("s.toml:1: expected text, found the character U+FE7F"));
+    EXPECT_THAT(refusal(least + "\n\xEF\xBB\xBD"), HasSubstr("s.toml:16: expected text, found the character U+FEFD"));
     EXPECT_THAT(refusal(least + std::string(1 << 20, ' ')), HasSubstr("at most 1 MiB"));
     EXPECT_THAT(refusal(std::string("title = \"a\0b\"\n", 15) + least), HasSubstr("expected TOML"));
     EXPECT_THAT(refusal(""), HasSubstr("title: expected a string, found nothing"));
@@ -328,16 +308,14 @@ TEST(SceneFile, FilesThatCannotBeReadAreRefused)
         }
         return std::string("accepted");
     };
-    EXPECT_THAT(message("no/such.toml"),
-                HasSubstr("no/such.toml: expected a scene file, found No such file"));
+    EXPECT_THAT(message("no/such.toml"), HasSubstr("no/such.toml: expected a scene file, found No such file"));
     EXPECT_THAT(message("/"), HasSubstr("found a directory"));
 }
 
 TEST(SceneFile, AtMostTwentyProblemsAreShown)
 {
     std::string text = least;
-    for (int k = 0; k < 30; ++k)
-        text += fmt::format("unknown_{} = 1\n", k);
+    for (int k = 0; k < 30; ++k) text += fmt::format("unknown_{} = 1\n", k);
     const auto message = refusal(text);
     EXPECT_EQ(std::count(message.begin(), message.end(), '\n'), 20);
     EXPECT_THAT(message, HasSubstr("and 10 more"));
@@ -355,28 +333,25 @@ TEST(SceneFile, HashTellsPhysicsFromBookkeeping)
     const auto hash = [](std::vector<std::string> sets) { return io::scene_hash(parsed(full, sets)); };
     const auto same = hash({});
     EXPECT_EQ(same.size(), 16u);
-    for (const char* set : {"title=other", "time.end=2", "output.every=0.1", "output.directory=elsewhere",
-                            "output.grain=0.1", "space.h=1.25"})
+    for (const char* set :
+         {"title=other", "time.end=2", "output.every=0.1", "output.directory=elsewhere", "output.grain=0.1", "space.h=1.25"})
         EXPECT_EQ(hash({set}), same) << set;
     for (const char* set :
-         {"time.step=2e-4", "space.h=1.3", "soil.clay.cohesion=4701", "body.0.velocity=[0,0,0]",
-          "wall.1.surface=rough", "effects.gravity=[0,0,-9.8]", "accuracy.kernel=cubic spline",
-          "accuracy.precision=double", "body.2.soil=sand", "effects.damping.until=0.4",
-          "body.3.polygon.y=[0.0,0.9]", "space.periodic=[\"x\",\"y\"]", "soil.sand.friction_angle=25.4"})
+         {"time.step=2e-4", "space.h=1.3", "soil.clay.cohesion=4701", "body.0.velocity=[0,0,0]", "wall.1.surface=rough",
+          "effects.gravity=[0,0,-9.8]", "accuracy.kernel=cubic spline", "accuracy.precision=double", "body.2.soil=sand",
+          "effects.damping.until=0.4", "body.3.polygon.y=[0.0,0.9]", "space.periodic=[\"x\",\"y\"]", "soil.sand.friction_angle=25.4"})
         EXPECT_NE(hash({set}), same) << set;
     auto renamed = parsed(full);
     renamed.soils[0].name = "gravel";
     EXPECT_EQ(io::scene_hash(renamed), same);
     // "auto" that turns out off is the same physics as nothing written.
-    EXPECT_EQ(io::scene_hash(parsed(least, {"effects.artificial_stress=auto"})),
-              io::scene_hash(parsed(least)));
+    EXPECT_EQ(io::scene_hash(parsed(least, {"effects.artificial_stress=auto"})), io::scene_hash(parsed(least)));
 }
 
 TEST(SceneFile, ReferenceNamesEveryKey)
 {
     const auto reference = io::scene_reference();
-    for (const auto& key : io::scene_keys())
-        EXPECT_THAT(reference, HasSubstr(std::string(key.leaf() == "*" ? "soil" : key.leaf())));
+    for (const auto& key : io::scene_keys()) EXPECT_THAT(reference, HasSubstr(std::string(key.leaf() == "*" ? "soil" : key.leaf())));
     EXPECT_THAT(reference, HasSubstr("## `[[body]]`"));
     EXPECT_THAT(reference, HasSubstr("| `spacing` | number | m | needed | 1e-06 <= x <= 1e+06 |"));
 }
@@ -385,16 +360,13 @@ TEST(SceneKeys, EveryExampleAndDefaultIsLegal)
 {
     // Examples stand in messages: they must not lead into the next error.
     for (const auto& key : io::scene_keys()) {
-        if (key.path.find('*') != key.path.npos || key.kind == io::Kind::Table ||
-            key.kind == io::Kind::Tables || key.kind == io::Kind::Named)
+        if (key.path.find('*') != key.path.npos || key.kind == io::Kind::Table || key.kind == io::Kind::Tables ||
+            key.kind == io::Kind::Named)
             continue;
         for (const auto& value : {key.example, key.fallback}) {
-            if (value.empty())
-                continue;
+            if (value.empty()) continue;
             const auto message = refusal(full, {key.path + "=" + value, "effects.gravity=[0,0,-9.81]"});
-            EXPECT_THAT(message, ::testing::Not(HasSubstr("--set " + key.path + "=" + value + ": " +
-                                                          key.path + ": expected a ")))
-                << value;
+            EXPECT_THAT(message, ::testing::Not(HasSubstr("--set " + key.path + "=" + value + ": " + key.path + ": expected a "))) << value;
         }
     }
 }

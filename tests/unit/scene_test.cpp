@@ -10,8 +10,7 @@ using namespace kuzure;
 using namespace kuzure::scene;
 using ::testing::HasSubstr;
 
-namespace
-{
+namespace {
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -23,8 +22,7 @@ Scene column()
     s.space.h = 1.2;
     s.time.end = 1;
     Soil sand;
-    sand.name = "sand", sand.density = 1850, sand.young = 1.8e6, sand.poisson = 0.3,
-    sand.friction_angle = radians(25);
+    sand.name = "sand", sand.density = 1850, sand.young = 1.8e6, sand.poisson = 0.3, sand.friction_angle = radians(25);
     s.soils = {sand};
     s.bodies = {{0, Box{{0, 0, 0}, {1, 1, 1}}}};
     s.walls = {{Box{{-1, -1, -0.4}, {2, 2, 0}}}};
@@ -35,18 +33,15 @@ Scene column()
 std::string found(const Scene& s, Severity severity, const std::string& key)
 {
     for (const auto& issue : check(s))
-        if (issue.severity == severity && issue.key == key)
-            return issue.text;
+        if (issue.severity == severity && issue.key == key) return issue.text;
     return "nothing";
 }
 std::string warning(const Scene& s, const std::string& key) { return found(s, Severity::Warning, key); }
 std::string error(const Scene& s, const std::string& key) { return found(s, Severity::Error, key); }
 const EffectNote& note(const Scene& s, const std::string& name)
 {
-    const auto at =
-        std::find_if(s.notes.begin(), s.notes.end(), [&](const auto& n) { return n.name == name; });
-    if (at == s.notes.end())
-        throw std::runtime_error("no note " + name);
+    const auto at = std::find_if(s.notes.begin(), s.notes.end(), [&](const auto& n) { return n.name == name; });
+    if (at == s.notes.end()) throw std::runtime_error("no note " + name);
     return *at;
 }
 
@@ -67,9 +62,8 @@ TEST(Material, ConesOfTheReferenceTable)
 {
     const struct {
         double phi, compression, extension, plane_strain, no_dilation;
-    } table[] = {{15, .1090, .0917, .0853, .0863}, {19.8, .1470, .1172, .1108, .1129},
-                 {25, .1893, .1426, .1369, .1409}, {30, .2309, .1650, .1601, .1667},
-                 {35, .2730, .1853, .1815, .1912}, {40, .3149, .2038, .2009, .2143}};
+    } table[] = {{15, .1090, .0917, .0853, .0863}, {19.8, .1470, .1172, .1108, .1129}, {25, .1893, .1426, .1369, .1409},
+                 {30, .2309, .1650, .1601, .1667}, {35, .2730, .1853, .1815, .1912},   {40, .3149, .2038, .2009, .2143}};
     for (const auto& row : table) {
         EXPECT_NEAR(Material::slope(Cone::Compression, radians(row.phi)), row.compression, 6e-5);
         EXPECT_NEAR(Material::slope(Cone::Extension, radians(row.phi)), row.extension, 6e-5);
@@ -82,8 +76,7 @@ TEST(Material, AllConesShareTheApex)
 {
     Soil soil = column().soils[0];
     soil.cohesion = 5000;
-    for (const auto cone :
-         {Cone::Compression, Cone::Extension, Cone::PlaneStrain, Cone::PlaneStrainNoDilation}) {
+    for (const auto cone : {Cone::Compression, Cone::Extension, Cone::PlaneStrain, Cone::PlaneStrainNoDilation}) {
         soil.cone = cone;
         EXPECT_NEAR(Material::from(soil).apex, 3 * 5000 / std::tan(radians(25)), 1e-8);
     }
@@ -103,8 +96,7 @@ TEST(Scene, ArtificialStressDecidesItself)
     resolve(s);
     EXPECT_FALSE(s.effects.artificial_stress);
     EXPECT_FALSE(note(s, "artificial_stress").on);
-    EXPECT_EQ(note(s, "artificial_stress").why,
-              "c = 0 and phi < 36.9 deg: no tensile principal stress can exist");
+    EXPECT_EQ(note(s, "artificial_stress").why, "c = 0 and phi < 36.9 deg: no tensile principal stress can exist");
 
     s.soils[0].cohesion = 1000;
     resolve(s);
@@ -141,12 +133,9 @@ TEST(Scene, EveryEffectIsNotedOnce)
 {
     auto s = column();
     resolve(s);
-    for (const char* name :
-         {"gravity", "viscosity", "artificial_stress", "damping", "dilation", "tension_cutoff",
-          "stress_at_rest", "rough_walls", "smooth_walls", "coulomb_walls", "periodic", "mixed_precision"})
-        EXPECT_EQ(
-            std::count_if(s.notes.begin(), s.notes.end(), [&](const auto& n) { return n.name == name; }), 1)
-            << name;
+    for (const char* name : {"gravity", "viscosity", "artificial_stress", "damping", "dilation", "tension_cutoff", "stress_at_rest",
+                             "rough_walls", "smooth_walls", "coulomb_walls", "periodic", "mixed_precision"})
+        EXPECT_EQ(std::count_if(s.notes.begin(), s.notes.end(), [&](const auto& n) { return n.name == name; }), 1) << name;
     for (const auto& n : s.notes) {
         EXPECT_FALSE(n.why.empty()) << n.name;
         EXPECT_EQ(n.why.find('\n'), n.why.npos);
@@ -173,8 +162,7 @@ TEST(Scene, StepsAreMeasuredAgainstTheSoundSpeed)
     EXPECT_THAT(warning(s, "time.step"), HasSubstr("above the recommended"));
     s.time.step = stable_step(s) * 1.001;
     EXPECT_THAT(error(s, "time.step"), HasSubstr("below the stable limit"));
-    for (const auto& issue : check(s, StepLimit::Force))
-        EXPECT_EQ(issue.severity, Severity::Warning) << issue.text;
+    for (const auto& issue : check(s, StepLimit::Force)) EXPECT_EQ(issue.severity, Severity::Warning) << issue.text;
     s.time.step.reset();
     s.accuracy.cfl = 0.5;
     EXPECT_THAT(warning(s, "accuracy.cfl"), HasSubstr("above the recommended"));

@@ -7,8 +7,7 @@
 using namespace kuzure;
 using namespace kuzure::scene;
 
-namespace
-{
+namespace {
 
 const Box box{{-0.3, 0.1, -0.2}, {0.7, 0.5, 0.6}};
 const Cylinder cylinder{{0.1, 0.2, -0.3}, 0.4, 0.7};
@@ -27,8 +26,7 @@ std::vector<Vector> random_points(int n)
     std::mt19937 random(7);
     std::uniform_real_distribution<double> u(-1.2, 1.6);
     std::vector<Vector> points;
-    for (int k = 0; k < n; ++k)
-        points.push_back({u(random), u(random), u(random)});
+    for (int k = 0; k < n; ++k) points.push_back({u(random), u(random), u(random)});
     return points;
 }
 
@@ -37,14 +35,12 @@ bool inside(const Shape& shape, Vector x, int dimensions)
 {
     const bool flat = dimensions == 2;
     if (const auto* b = std::get_if<Box>(&shape))
-        return x.x > b->low.x && x.x < b->high.x && x.z > b->low.z && x.z < b->high.z &&
-               (flat || (x.y > b->low.y && x.y < b->high.y));
+        return x.x > b->low.x && x.x < b->high.x && x.z > b->low.z && x.z < b->high.z && (flat || (x.y > b->low.y && x.y < b->high.y));
     if (const auto* c = std::get_if<Cylinder>(&shape))
-        return std::pow(x.x - c->base.x, 2) + std::pow(x.y - c->base.y, 2) < c->radius * c->radius &&
-               x.z > c->base.z && x.z < c->base.z + c->height;
+        return std::pow(x.x - c->base.x, 2) + std::pow(x.y - c->base.y, 2) < c->radius * c->radius && x.z > c->base.z &&
+               x.z < c->base.z + c->height;
     if (const auto* s = std::get_if<Sphere>(&shape))
-        return std::pow(x.x - s->center.x, 2) + (flat ? 0 : std::pow(x.y - s->center.y, 2)) +
-                   std::pow(x.z - s->center.z, 2) <
+        return std::pow(x.x - s->center.x, 2) + (flat ? 0 : std::pow(x.y - s->center.y, 2)) + std::pow(x.z - s->center.z, 2) <
                s->radius * s->radius;
     const auto& p = std::get<Polygon>(shape);
     double turn = 0;
@@ -62,8 +58,7 @@ TEST(Shape, InsideIsInside)
 {
     for (const auto& shape : shapes)
         for (const int dimensions : {2, 3}) {
-            if (dimensions == 2 && std::holds_alternative<Cylinder>(shape))
-                continue;
+            if (dimensions == 2 && std::holds_alternative<Cylinder>(shape)) continue;
             int n = 0;
             for (const auto& x : random_points(5000)) {
                 EXPECT_EQ(contains(shape, x, dimensions), inside(shape, x, dimensions)) << name_of(shape);
@@ -77,8 +72,7 @@ TEST(Shape, FollowingTheNormalLeadsToTheSurface)
 {
     for (const auto& shape : shapes)
         for (const int dimensions : {2, 3}) {
-            if (dimensions == 2 && std::holds_alternative<Cylinder>(shape))
-                continue;
+            if (dimensions == 2 && std::holds_alternative<Cylinder>(shape)) continue;
             for (const auto& x : random_points(3000)) {
                 const auto c = contact(shape, x, dimensions);
                 EXPECT_NEAR(length(c.normal), 1, 1e-12);
@@ -187,7 +181,7 @@ TEST(Shape, PolygonsThatAreNoneAreFound)
     EXPECT_TRUE(crosses_itself({{{0, 0}, {1, 0}, {0.5, 0}}, {}}));
     EXPECT_TRUE(crosses_itself({{{0, 0}, {0, 0}, {1, 1}}, {}}));
     EXPECT_TRUE(crosses_itself({{{0, 0}, {2, 0}, {2, 1}, {1, 0}, {0, 1}}, {}})); // a corner on another edge
-    EXPECT_FALSE(crosses_itself({{{0, 0}, {1, 0}, {2, 0}, {1, 1}}, {}})); // a corner on a straight line
+    EXPECT_FALSE(crosses_itself({{{0, 0}, {1, 0}, {2, 0}, {1, 1}}, {}}));        // a corner on a straight line
     EXPECT_DOUBLE_EQ(area({{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {}}), 1);
     EXPECT_DOUBLE_EQ(area(reversed({{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {}})), -1);
 }

@@ -11,14 +11,12 @@ using namespace kuzure;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-namespace
-{
+namespace {
 
 const Alone alone;
 
-class SnapshotTest : public testing::Test
-{
-  protected:
+class SnapshotTest : public testing::Test {
+protected:
     void SetUp() override
     {
         char name[] = "/tmp/kuzure_snapshot_XXXXXX";
@@ -52,8 +50,7 @@ class SnapshotTest : public testing::Test
     {
         std::vector<std::string> names;
         const auto all = nlohmann::json::parse(io::read_text(dir / "state.hdf.series"));
-        for (const auto& f : all.at("files"))
-            names.push_back(f.at("name").get<std::string>() + " " + f.at("time").dump());
+        for (const auto& f : all.at("files")) names.push_back(f.at("name").get<std::string>() + " " + f.at("time").dump());
         return names;
     }
 
@@ -82,12 +79,10 @@ TEST_F(SnapshotTest, HoldsThePromisedTables)
     EXPECT_THAT(read<std::int32_t>(in, "PointData/kind", 1), ElementsAre(0, 0, 1));
     EXPECT_THAT(read<std::int32_t>(in, "PointData/soil", 1), ElementsAre(0, 1, -1));
     EXPECT_THAT(read<double>(in, "PointData/velocity", 3), ElementsAre(1, 2, 3, 1, 2, 3, 0, 0, 0));
-    EXPECT_THAT(read<double>(in, "PointData/stress", 6),
-                ElementsAre(1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0, 0, 0));
+    EXPECT_THAT(read<double>(in, "PointData/stress", 6), ElementsAre(1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0, 0, 0));
     EXPECT_THAT(read<double>(in, "PointData/density", 1), ElementsAre(1800, 1801, 2000));
     EXPECT_THAT(read<double>(in, "PointData/plastic_strain", 1), ElementsAre(0, 0, 0));
-    EXPECT_THAT(read<double>(in, "PointData/displacement", 3),
-                ElementsAre(0, 0.25, 0.5, 1, 1.25, 1.5, 0, 0, 0));
+    EXPECT_THAT(read<double>(in, "PointData/displacement", 3), ElementsAre(0, 0.25, 0.5, 1, 1.25, 1.5, 0, 0, 0));
     EXPECT_THAT(read<double>(in, "FieldData/TimeValue", 1), ElementsAre(0.25));
     EXPECT_EQ(in.text("/VTKHDF/PointData/stress", "unit"), "Pa");
     EXPECT_EQ(in.text("/VTKHDF/Points", "unit"), "m");
@@ -125,19 +120,16 @@ TEST_F(SnapshotTest, TheSeriesFollowsARestart)
     {
         io::Snapshots s(alone, dir);
         EXPECT_FALSE(s.last_time());
-        for (const double t : {0.0, 0.1, 0.2, 0.3})
-            s.write(p, walls, {t, 0, 3, "", {"velocity"}});
+        for (const double t : {0.0, 0.1, 0.2, 0.3}) s.write(p, walls, {t, 0, 3, "", {"velocity"}});
     }
-    EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2",
-                                      "state_000003.hdf 0.3"));
+    EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2", "state_000003.hdf 0.3"));
     std::filesystem::remove(dir / "state.hdf.series"); // the files alone are enough
     io::Snapshots s(alone, dir, 0.15);
     EXPECT_EQ(s.last_time(), 0.1);
     EXPECT_FALSE(std::filesystem::exists(dir / "state_000003.hdf"));
     EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1"));
     EXPECT_EQ(s.write(p, walls, {0.2, 0, 3, "", {"velocity"}}), dir / "state_000002.hdf");
-    EXPECT_THAT(series(),
-                ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2"));
+    EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2"));
 }
 
 TEST_F(SnapshotTest, AFailureNamesFileAndCauseAndLeavesNothing)

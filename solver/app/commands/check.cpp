@@ -1,10 +1,10 @@
 // kuzure check: what will be simulated and why, counts, step, memory, disk. Runs nothing.
+#include "solver/scene/check.hpp"
 #include "io/checkpoint.hpp"
 #include "io/snapshot.hpp"
 #include "io/summary.hpp"
 #include "solver/app/command.hpp"
 #include "solver/kernels/step.hpp"
-#include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -45,16 +45,24 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
              2.0 * double(io::checkpoint_bytes(e.soil, std::size_t(scene::column_bytes(f) / std::max<double>(1, double(e.soil))))) +
              (s.output.history ? s.time.end / *s.output.history * 320 : 0);
     const double ns = mixed ? 4.0 : 7.0; // per pair and core
-    e.seconds = double(e.steps) * double(e.soil) * (neighbours * 0.93 * ns * 1e-9 + 60e-9) / std::max(1u, std::thread::hardware_concurrency());
+    e.seconds =
+        double(e.steps) * double(e.soil) * (neighbours * 0.93 * ns * 1e-9 + 60e-9) / std::max(1u, std::thread::hardware_concurrency());
     return e;
 }
 
-std::string bytes_text(double b)
-{
-    return b > 1e9 ? fmt::format("{:.1f} GB", b * 1e-9) : fmt::format("{:.0f} MB", b * 1e-6);
-}
+std::string bytes_text(double b) { return b > 1e9 ? fmt::format("{:.1f} GB", b * 1e-9) : fmt::format("{:.0f} MB", b * 1e-6); }
 
 } // namespace
+
+void add_reference(CLI::App& app, Action& chosen)
+{
+    app.add_subcommand("reference", "every key of a scene, as Markdown (docs/scene.md)")->callback([&chosen] {
+        chosen = [](const Comm& comm) {
+            if (comm.rank() == 0) fmt::print("{}", io::scene_reference());
+            return Exit::Ok;
+        };
+    });
+}
 
 void add_check(CLI::App& app, Action& chosen)
 {
@@ -74,9 +82,15 @@ void add_check(CLI::App& app, Action& chosen)
                 warnings.push_back(issue.key + ": " + issue.text);
             if (comm.rank() != 0) return Exit::Ok;
             if (*json) {
-                nlohmann::ordered_json j{{"soil_particles", e.soil}, {"wall_particles", e.walls}, {"dt", e.dt}, {"steps", e.steps},
-                                         {"memory_bytes", std::int64_t(e.memory)}, {"disk_bytes", std::int64_t(e.disk)},
-                                         {"predicted_seconds", e.seconds}, {"effects", io::effects_json(s.notes)}, {"warnings", warnings}};
+                nlohmann::ordered_json j{{"soil_particles", e.soil},
+                                         {"wall_particles", e.walls},
+                                         {"dt", e.dt},
+                                         {"steps", e.steps},
+                                         {"memory_bytes", std::int64_t(e.memory)},
+                                         {"disk_bytes", std::int64_t(e.disk)},
+                                         {"predicted_seconds", e.seconds},
+                                         {"effects", io::effects_json(s.notes)},
+                                         {"warnings", warnings}};
                 fmt::print("{}\n", j.dump(2));
                 return Exit::Ok;
             }

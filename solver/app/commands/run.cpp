@@ -34,10 +34,7 @@ struct Arguments {
 volatile std::sig_atomic_t asked_to_stop = 0;
 void on_signal(int) { asked_to_stop = 1; }
 
-double now()
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 std::string header_text(const Simulation& sim)
 {
@@ -101,8 +98,9 @@ public:
         const double rate = (sim.steps() - first_step_) / std::max(t - start_, 1e-9);
         const double done = std::min(sim.time() / end_, 1.0);
         const double left = sim.time() > first_time_ ? (t - start_) * (end_ - sim.time()) / (sim.time() - first_time_) : 0;
-        std::string line = fmt::format("t {:.4f} of {:g} s  step {}  dt {:.2e}  {:.1f} steps/s  max {:.2f} m/s  residual {:+.2e}  {:.0f} s left",
-                                       sim.time(), end_, sim.steps(), sim.dt(), rate, sim.max_speed(), residual, left);
+        std::string line =
+            fmt::format("t {:.4f} of {:g} s  step {}  dt {:.2e}  {:.1f} steps/s  max {:.2f} m/s  residual {:+.2e}  {:.0f} s left",
+                        sim.time(), end_, sim.steps(), sim.dt(), rate, sim.max_speed(), residual, left);
         if (sim.comm().size() > 1) line += fmt::format("  imbalance {:.2f}", sim.structure().imbalance);
         if (bar_) {
             const int width = 20, full = int(done * width);
@@ -152,9 +150,10 @@ private:
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
         if (from && from->scene_hash != hash_)
-            throw BadInput(fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
-                                       "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
-                                       from->file.string(), from->scene_hash, hash_));
+            throw BadInput(
+                fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
+                            "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
+                            from->file.string(), from->scene_hash, hash_));
         const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every, 50};
         std::optional<double> restart_time;
         if (from) {
@@ -173,8 +172,9 @@ private:
         io::on_root(comm_, [&] {
             char host[256] = "";
             gethostname(host, sizeof host - 1);
-            io::write_atomically(dir_->scene(), fmt::format("# {}\n# host {}, {} ranks x {} threads, scene hash {}, pair model {}\n{}", version_text(),
-                                                            host, comm_.size(), threads_, hash_, sim_->model().name(), io::write_scene(scene_)));
+            io::write_atomically(dir_->scene(),
+                                 fmt::format("# {}\n# host {}, {} ranks x {} threads, scene hash {}, pair model {}\n{}", version_text(),
+                                             host, comm_.size(), threads_, hash_, sim_->model().name(), io::write_scene(scene_)));
             std::filesystem::create_directories(dir_->snapshots());
             std::filesystem::remove(dir_->stop());
         });
@@ -215,9 +215,9 @@ private:
         const Ledger l = sim_->ledger();
         const Heap heap = measure_heap(comm_, sim_->particles(), scene_, sim_->filling());
         residual_ = sim_->residual(l);
-        history_->append({sim_->time(), sim_->steps(), sim_->dt(), l.state.kinetic, l.state.potential, l.state.elastic, l.dissipated.plastic,
-                          l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, residual_, sim_->max_speed(), heap.height, heap.min_x,
-                          heap.max_x, heap.min_y, heap.max_y});
+        history_->append({sim_->time(), sim_->steps(), sim_->dt(), l.state.kinetic, l.state.potential, l.state.elastic,
+                          l.dissipated.plastic, l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, residual_, sim_->max_speed(),
+                          heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y});
     }
 
     void write_picture(int number)
@@ -258,9 +258,9 @@ private:
         s.seconds_per_step = steps_here > 0 ? stepping / double(steps_here) : 0;
         const std::int64_t particle_steps = comm_.sum(work.particle_steps);
         s.particle_steps_per_second = stepping > 0 ? double(particle_steps) / stepping : 0;
-        s.energy = {{"kinetic", l.state.kinetic},        {"potential", l.state.potential}, {"elastic", l.state.elastic},
-                    {"plastic", l.dissipated.plastic},   {"viscous", l.dissipated.viscous}, {"wall", l.dissipated.wall},
-                    {"damping", l.dissipated.damping},   {"residual", sim_->residual(l)}};
+        s.energy = {{"kinetic", l.state.kinetic},      {"potential", l.state.potential},  {"elastic", l.state.elastic},
+                    {"plastic", l.dissipated.plastic}, {"viscous", l.dissipated.viscous}, {"wall", l.dissipated.wall},
+                    {"damping", l.dissipated.damping}, {"residual", sim_->residual(l)}};
         s.effects = scene_.notes;
         s.state_hash = state_hash(comm_, sim_->particles());
         s.message = message;
@@ -317,8 +317,8 @@ private:
                     write_checkpoint();
                     write_summary("stopped", Exit::Stopped);
                     progress.show(sim, residual_, true);
-                    say(fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim.time(), sim.steps(),
-                                    checkpoint_.string()));
+                    say(fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim.time(),
+                                    sim.steps(), checkpoint_.string()));
                     return Exit::Stopped;
                 }
                 if (w.checkpoint) write_checkpoint();
@@ -328,7 +328,8 @@ private:
             loop_seconds_ = now() - begin;
             std::string text = e.what();
             try {
-                snapshots_->write(sim.particles(), walls_, {sim.time(), sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
+                snapshots_->write(sim.particles(), walls_,
+                                  {sim.time(), sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
                 text += fmt::format(". The moment is in the last snapshot of {}", dir_->snapshots().string());
                 text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
                 write_summary("numbers failed", Exit::NumbersFailed, text);
@@ -337,13 +338,14 @@ private:
             }
             throw NumbersFailed(text);
         } catch (const IoFailed& e) {
-            throw IoFailed(std::string(e.what()) +
-                           (checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string()));
+            throw IoFailed(std::string(e.what()) + (checkpoint_.empty() ? ". No checkpoint had been written"
+                                                                        : ". The last good checkpoint is " + checkpoint_.string()));
         }
         write_summary("finished", Exit::Ok);
         progress.show(sim, residual_, true);
-        say(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {:+.2e}; results in {}", sim.steps() - first_step_, now() - start_,
-                        1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)), residual_, dir_->path().string()));
+        say(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {:+.2e}; results in {}", sim.steps() - first_step_,
+                        now() - start_, 1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)), residual_,
+                        dir_->path().string()));
         return Exit::Ok;
     }
 
@@ -377,8 +379,10 @@ void add_run(CLI::App& app, Action& chosen)
                         ->type_name("FILE")
                         ->expected(0, 1)
                         ->default_str("");
-    command->add_option("--threads", a->threads, "threads of each rank (default: the node's cores shared by its ranks)")->check(CLI::Range(1, 4096));
-    command->add_option("--max-minutes", a->max_minutes, "stop with a checkpoint and exit code 5 after so many minutes")->check(CLI::PositiveNumber);
+    command->add_option("--threads", a->threads, "threads of each rank (default: the node's cores shared by its ranks)")
+        ->check(CLI::Range(1, 4096));
+    command->add_option("--max-minutes", a->max_minutes, "stop with a checkpoint and exit code 5 after so many minutes")
+        ->check(CLI::PositiveNumber);
     command->add_flag("--quiet", a->quiet, "print nothing but errors");
     command->add_flag("--force", a->force, "move an existing result directory aside");
     command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");

@@ -1,0 +1,159 @@
+#!/usr/bin/python3
+"""INTERFACE of the program: exit codes, messages, files and what is in them."""
+import csv, glob, json, os, shutil, signal, subprocess, sys, tempfile, time
+
+import h5py
+import numpy as np
+
+program = os.path.abspath(sys.argv[1])
+root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+work = tempfile.mkdtemp(prefix="kuzure-contract-")
+failures = []
+
+
+def check(good, what):
+    print(("ok    " if good else "FAIL  ") + what, flush=True)
+    if not good:
+        failures.append(what)
+
+
+def call(*args, expect=0, **kw):
+    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=600, cwd=work, **kw)
+    check(done.returncode == expect, f"{' '.join(args)[:90]}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-200:]}")
+    return done
+
+
+SMALL = """title = "small"
+dimensions = 3
+[space]
+spacing = 0.04
+h = 1.2
+[time]
+end = 0.004
+step = 1.0e-4
+[soil.sand]
+density = 1850.0
+young = 1.8e6
+poisson = 0.3
+friction_angle = 25.0
+[[body]]
+soil = "sand"
+box = { low = [0.0, 0.0, 0.0], high = [0.32, 0.32, 0.32] }
+[[wall]]
+box = { low = [-0.4, -0.4, -0.16], high = [0.72, 0.72, 0.0] }
+[effects]
+gravity = [0.0, 0.0, -9.81]
+viscosity = { alpha = 0.1, beta = 0.0 }
+[output]
+every = 0.002
+history = 0.0005
+picture = { view = "oblique", color = "displacement" }
+"""
+try:
+    scene = os.path.join(work, "small.toml")
+    with open(scene, "w") as f:
+        f.write(SMALL)
+    # ---- check
+    report = json.loads(call("check", scene, "--json").stdout)
+    for key in ("soil_particles", "wall_particles", "dt", "steps", "memory_bytes", "disk_bytes", "predicted_seconds", "effects", "warnings"):
+        check(key in report, f"check --json has {key}")
+    check(report["soil_particles"] == 512 and report["wall_particles"] == 28 * 28 * 4, "check counts particles")
+    check(report["steps"] == 40 and report["dt"] == 1e-4, "check counts steps")
+    call("check", scene)
+    # ---- run and its files
+    call("run", scene, "-o", "out", "--quiet")
+    out = os.path.join(work, "out")
+    for name in ("scene.toml", "history.csv", "summary.json", "timers.json", "timers.txt", "checkpoint.h5", "snapshots/state.hdf.series"):
+        check(os.path.isfile(os.path.join(out, name)), f"the run leaves {name}")
+    snaps = sorted(glob.glob(out + "/snapshots/state_*.hdf"))
+    check(len(snaps) == 3, f"three snapshots ({len(snaps)})")
+    check(len(glob.glob(out + "/picture_*.png")) == 3, "three pictures")
+    with h5py.File(snaps[-1]) as f:
+        g = f["VTKHDF"]
+        points, data = g["Points"], g["PointData"]
+        check(points.shape == (512 + 3136, 3) and points.dtype == np.float64, "Points are float64 of soil and walls")
+        check(set(data) >= {"id", "kind", "soil", "velocity", "stress", "density", "plastic_strain", "displacement"}, "PointData is complete")
+        check(data["id"].dtype == np.int64 and sorted(data["id"]) == list(range(512 + 3136)), "ids are 0 .. n-1")
+        check(int((np.array(data["kind"]) == 0).sum()) == 512, "kind tells soil from wall")
+        soil = np.array(data["kind"]) == 0
+        stress = np.array(data["stress"])[soil]
+        # sqrt(J2) + alpha I1 <= k: no snapshot shows a stress outside the cone
+        I1 = stress[:, :3].sum(1)
+        s = stress.copy()
+        s[:, :3] -= I1[:, None] / 3
+        J2 = 0.5 * (s[:, :3] ** 2).sum(1) + (s[:, 3:] ** 2).sum(1)
+        sin = np.sin(np.radians(25))
+        alpha = 2 * sin / (np.sqrt(3) * (3 - sin))
+        check(float((np.sqrt(J2) + alpha * I1).max()) <= 1e-9 * max(1.0, float(abs(I1).max())), "stresses lie in the cone")
+    with open(out + "/history.csv") as f:
+        rows = list(csv.reader(f))
+    check(rows[0][:3] == ["time", "step", "dt"] and rows[1][0].startswith("#"), "history.csv has header and units")
+    check(len(rows) == 2 + 9, f"history.csv has its rows ({len(rows) - 2})")
+    first = dict(zip(rows[0], rows[2]))
+    check(abs(float(first["height"]) - 0.32) < 1e-9 and abs(float(first["front_max_x"]) - 0.32) < 1e-9, "height and front at the start")
+    summary = json.load(open(out + "/summary.json"))
+    for key in ("status", "exit_code", "scene_hash", "version", "ranks", "threads", "precision", "soil_particles", "wall_particles", "steps", "time",
+                "wall_seconds", "pairs", "seconds_per_step", "particle_steps_per_second", "energy", "effects", "state_hash"):
+        check(key in summary, f"summary.json has {key}")
+    check(summary["status"] == "finished" and summary["steps"] == 40 and summary["exit_code"] == 0, "summary.json tells the end")
+    # ---- the written scene runs again to the same bits
+    call("run", out + "/scene.toml", "-o", "again", "--quiet")
+    again = json.load(open(work + "/again/summary.json"))
+    check(again["state_hash"] == summary["state_hash"] and again["scene_hash"] == summary["scene_hash"], "scene.toml gives the same bits")
+    # ---- nothing is overwritten
+    before = open(out + "/summary.json").read()
+    call("run", scene, "-o", "out", "--quiet", expect=2)
+    check(open(out + "/summary.json").read() == before, "a refused run touches nothing")
+    call("run", scene, "-o", "out", "--quiet", "--force")
+    check(os.path.isfile(work + "/out.old-1/summary.json"), "--force moves the old results aside")
+    # ---- bad input: exit 2, the key named, nothing written
+    bad = call("run", scene, "-o", "bad", "--set", "soil.sand.poisson=0.7", expect=2)
+    check("poisson" in bad.stderr and not os.path.exists(work + "/bad"), "a bad value is named and nothing is written")
+    bad = call("run", scene, "-o", "bad", "--set", "time.stepp=1e-4", expect=2)
+    check("step" in bad.stderr, "a misspelt key is named")
+    bad = call("run", scene, "-o", "bad", "--set", "time.step=1e-2", expect=2)
+    check("step" in bad.stderr and not os.path.exists(work + "/bad"), "a step above the stable limit is refused")
+    call("run", "nowhere.toml", expect=2)
+    call("frobnicate", expect=2)
+    # ---- numbers that fail: exit 3, a snapshot of the moment
+    blown = call("run", scene, "-o", "blown", "--quiet", "--force-step", "--set", "time.step=8e-3", "--set", "time.end=8.0", expect=3)
+    check("particle" in blown.stderr and "Remedy" in blown.stderr, "a blow-up names the particle and the remedy")
+    check(json.load(open(work + "/blown/summary.json"))["exit_code"] == 3, "summary.json tells the failure")
+    box = call("run", scene, "-o", "left", "--quiet", "--set", "space.low=[-0.1,-0.1,-0.1]", "--set", "space.high=[0.33,1,1]", "--set",
+               "body.0.velocity=[3,0,0]", "--set", "time.end=0.1", expect=3)
+    check("left the box" in box.stderr, "a particle that leaves the box is named")
+    # ---- stopping on request: exit 5, and on to the same bits
+    process = subprocess.Popen([program, "run", scene, "-o", "stop", "--quiet", "--set", "time.end=3"], cwd=work)
+    while not os.path.exists(work + "/stop/history.csv"):
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGUSR1)
+    check(process.wait(60) == 5, "SIGUSR1 stops with exit 5")
+    stopped = json.load(open(work + "/stop/summary.json"))
+    check(stopped["status"] == "stopped" and os.path.exists(work + "/stop/checkpoint.h5"), "a stopped run leaves a checkpoint")
+    end = (stopped["steps"] + 50) * 1e-4
+    call("run", scene, "-o", "stop", "--quiet", "--restart", "--set", f"time.end={end}")
+    call("run", scene, "-o", "straight", "--quiet", "--set", f"time.end={end}")
+    a, b = (json.load(open(f"{work}/{d}/summary.json")) for d in ("stop", "straight"))
+    check(a["state_hash"] == b["state_hash"] and a["pairs"] == b["pairs"], "a stopped and restarted run has the bits of an undisturbed one")
+    for key in a["energy"]:
+        check(a["energy"][key] == b["energy"][key], f"the restart keeps the ledger: {key}")
+    call("run", scene, "-o", "stop", "--quiet", "--restart", "--set", "soil.sand.young=2e6", expect=2)
+    # ---- a damaged checkpoint
+    path = work + "/straight/checkpoint.h5"
+    data = bytearray(open(path, "rb").read())
+    data[len(data) // 2] ^= 0x10
+    open(path, "wb").write(data)
+    call("run", scene, "-o", "straight", "--quiet", "--restart", "--set", f"time.end={end}", expect=4)
+    # ---- documents that cannot drift
+    check(open(root + "/docs/scene.md").read() == call("reference").stdout, "docs/scene.md is what `kuzure reference` prints")
+    call("report", "again")
+    page = open(work + "/again/report.html").read()
+    check("<svg" in page and "data:image/png" in page and "http" not in page.split("<h2>Scene")[0], "report.html is self-contained")
+    call("report", "nowhere", expect=2)
+    version = call("--version").stdout
+    check("kuzure" in version and "GCC" in version, "--version tells program and compiler")
+finally:
+    shutil.rmtree(work, ignore_errors=True)
+print(f"{len(failures)} failures")
+sys.exit(1 if failures else 0)
