@@ -210,6 +210,8 @@ double Simulation::next_dt() const
     return clock_.time + dt * (1 + 1e-9) >= end ? end - clock_.time : dt;
 }
 
+bool Simulation::outran() const { return std::sqrt(clock_.extremes.speed2) * clock_.dt > scene_.smoothing_length(); }
+
 bool Simulation::outgrown() const { return !built_ || 2 * std::sqrt(clock_.extremes.moved2) > skin_ * (1 - 1e-6); }
 
 Wishes Simulation::step(Wishes mine)
@@ -310,7 +312,7 @@ Wishes Simulation::step(Wishes mine)
         clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5]};
         mine = {all[6] != 0, all[7] != 0};
     });
-    if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0) report_failure();
+    if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0 || outran()) report_failure();
     return mine;
 }
 
@@ -331,7 +333,7 @@ void Simulation::report_failure()
     for (Index i = 0; i < p.size(); ++i) {
         const Vector x = p[field::position][i];
         bool failed = !finite(x) || !finite(p[field::velocity][i]) || !std::isfinite(trace(p[field::stress][i])) ||
-                      !std::isfinite(p[field::density][i]);
+                      !std::isfinite(p[field::density][i]) || length(p[field::velocity][i]) * clock_.dt > scene_.smoothing_length();
         if (scene_.space.low) {
             const Vector lo = *scene_.space.low, hi = *scene_.space.high;
             const auto out = [&](int axis, double v, double a, double b) { return !scene_.space.periodic[axis] && (v < a || v > b); };
@@ -345,17 +347,19 @@ void Simulation::report_failure()
     int root = 0;
     if (where >= 0 && mine == lowest) {
         const Vector x = p[field::position][where], v = p[field::velocity][where];
-        const bool box = clock_.extremes.bad == 0;
-        text =
-            box ? fmt::format("particle {} (body {}) left the box at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. "
-                              "Remedy: a larger space.low/space.high, a longer wall, or a smaller step",
-                              mine, filling_.body_of(mine), x.x, x.y, x.z, length(v), clock_.step, clock_.time)
-                : fmt::format(
-                      "the numbers of particle {} (body {}) are no longer finite at ({:.4g}, {:.4g}, {:.4g}) m in step {}, t = {:.6g} s: "
-                      "the time step is too long for the stiffness (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
-                      "accuracy.cfl, or more viscosity",
-                      mine, filling_.body_of(mine), x.x, x.y, x.z, clock_.step, clock_.time, clock_.dt,
-                      scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed);
+        const double crossing = scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed;
+        const std::string who = fmt::format("particle {} (body {})", mine, filling_.body_of(mine));
+        const std::string there = fmt::format("at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s", x.x, x.y, x.z,
+                                              length(v), clock_.step, clock_.time);
+        if (clock_.extremes.bad == 0 && !outran())
+            text = fmt::format("{} left the box {}. Remedy: a larger space.low/space.high, a longer wall, or a smaller step", who, there);
+        else
+            text = fmt::format("{} {} {}: the time step is too long (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
+                               "accuracy.cfl, or more viscosity",
+                               who,
+                               clock_.extremes.bad == 0 ? "went further than its smoothing length in one step,"
+                                                        : "has numbers that are no longer finite,",
+                               there, clock_.dt, crossing);
         root = comm_.rank();
     }
     root = int(comm_.max(std::int64_t(root)));

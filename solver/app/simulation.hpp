@@ -105,6 +105,8 @@ private:
     void renew_walls();
     void make_records();
     bool outgrown() const;
+    /// A particle went further than its smoothing length in the last step.
+    bool outran() const;
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
     std::size_t row_bytes() const;
     [[noreturn]] void report_failure();

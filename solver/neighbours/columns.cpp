@@ -66,7 +66,7 @@ ColumnSort sort_into_columns(const Columns& columns, const double* x, const doub
         x0 = std::min(x0, cx[i]), x1 = std::max(x1, cx[i]), y0 = std::min(y0, cy[i]), y1 = std::max(y1, cy[i]);
     }
     const double n_columns = (double(x1) - x0 + 1) * (double(y1) - y0 + 1);
-    if (n_columns > 3e8)
+    if (n_columns > 1e8)
         throw NumbersFailed(fmt::format("the soil has spread over {:.3g} columns of {:.3g} m: a particle flew off. Remedy: a smaller "
                                         "step (time.step or accuracy.cfl), more viscosity, or a box (space.low, space.high)",
                                         n_columns, columns.width_x));

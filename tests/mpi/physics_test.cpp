@@ -9,7 +9,7 @@ using namespace kuzure;
 
 namespace {
 
-struct Text {
+struct SceneText {
     std::string end = "1.0", step = "step = 1.0e-4", bodies, walls, effects = "gravity = [0.0, 0.0, -9.81]", space, soil, accuracy;
     int dimensions = 3;
     double spacing = 0.04;
@@ -43,7 +43,7 @@ Vector mean_velocity(const Simulation& sim)
 // SPH-2: z = z0 - g t^2/2, and not a pascal of stress.
 TEST(FreeFall, IsExactAndStressFree)
 {
-    Text t;
+    SceneText t;
     t.end = "0.05";
     t.bodies = box("body", "0, 0, 0", "0.24, 0.24, 0.24", "soil = \"s\"\nvelocity = [1.0, 0.0, 2.0]");
     t.effects += "\nviscosity = { alpha = 0.1, beta = 0.0 }";
@@ -66,7 +66,7 @@ TEST(Walls, SmoothLetsSlideRoughHolds)
     double left[3];
     const char* surfaces[3] = {"\"smooth\"", "\"rough\"", "{ friction_angle = 20.0 }"};
     for (int k = 0; k < 3; ++k) {
-        Text t;
+        SceneText t;
         t.end = "0.1";
         t.soil = "cohesion = 2.0e4";
         t.bodies = box("body", "0, 0, 0", "0.4, 0.24, 0.16", "soil = \"s\"\nvelocity = [0.5, 0.0, 0.0]");
@@ -85,7 +85,7 @@ TEST(Walls, SmoothLetsSlideRoughHolds)
 // SPH-8: an elastic column under sudden gravity swings with T = 4 H/c_p.
 TEST(Column, SwingsWithThePeriodOfItsPWave)
 {
-    Text t;
+    SceneText t;
     t.end = "0.2";
     t.soil = "cohesion = 1.0e6";
     t.space = "low = [0.0, 0.0, -1.0]\nhigh = [0.24, 0.24, 3.0]\nperiodic = [\"x\", \"y\"]";
@@ -114,7 +114,7 @@ TEST(Ledger, ClosesInACollapse)
 {
     for (const int dimensions : {3, 2})
         for (const bool fixed : {true, false}) {
-            Text t;
+            SceneText t;
             t.dimensions = dimensions;
             t.end = "0.25";
             if (!fixed) t.step.clear();
