@@ -203,25 +203,27 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
 /// How one particle feels one wall: the surface's distance and normal, what its velocity and stress look like there.
 struct WallContact {
     double distance;
-    Vector normal, mirrored; // m, 1, m/s: the velocity that the wall mirrors
+    Vector normal, mirrored; // m, 1, m/s: the velocity that the wall mirrors,
+    Vector colliding;        // m/s: and its part that viscosity acts on
     Stress stress;           // the stress that both sides of the surface carry
 };
 
 inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, const Stress& s, int dimensions)
 {
     const auto c = scene::contact(wall.shape, x, dimensions);
-    WallContact w{c.distance, c.normal, v, s};
+    WallContact w{c.distance, c.normal, v, v, s};
     if (wall.surface == scene::Surface::Rough) return w;
     // sigma = ... + tau (x) n + n (x) tau: the shear that the surface carries is tau = sigma.n - (n.sigma.n) n
     const Vector n = c.normal, traction = s * n;
     const double normal = dot(n, traction);
     const Vector tau = traction - normal * n;
     double keep = 0;
+    w.colliding = dot(v, n) * n;
     if (wall.surface == scene::Surface::Coulomb) {
         const double shear = length(tau), limit = std::tan(wall.friction_angle) * std::max(-normal, 0.0);
         keep = shear > limit ? limit / shear : 1.0;
     } else {
-        w.mirrored = dot(v, n) * n;
+        w.mirrored = w.colliding;
     }
     const double lost = 1 - keep;
     w.stress = s - Stress{lost * 2 * tau.x * n.x,
@@ -230,6 +232,10 @@ inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, con
                           lost * (tau.x * n.y + tau.y * n.x),
                           lost * (tau.y * n.z + tau.z * n.y),
                           lost * (tau.x * n.z + tau.z * n.x)};
+    // A surface that slides does not pull: tension across it would hold one end while the other presses, and rub more
+    // than the weight allows.
+    if (wall.surface == scene::Surface::Coulomb && normal > 0)
+        w.stress = w.stress - normal * Stress{n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.x * n.z};
     return w;
 }
 
@@ -253,18 +259,18 @@ template <class Model, class V, class T>
         const auto list = runs.subspan(2, runs[1]);
         runs = runs.subspan(2 + runs[1]);
         WallContact contact[W];
-        T normal[3][W], mirrored[3][W], inverse_distance[W];
+        T normal[3][W], colliding[3][W], inverse_distance[W];
         for (int k = 0; k < W; ++k) {
             const Index at = i.first + std::min(k, i.count - 1);
             contact[k] = wall_contact(*wall.wall, x[at], v[at], sigma[at], dimensions);
             const auto& c = contact[k];
             normal[0][k] = T(c.normal.x), normal[1][k] = T(c.normal.y), normal[2][k] = T(c.normal.z);
-            mirrored[0][k] = T(c.mirrored.x), mirrored[1][k] = T(c.mirrored.y), mirrored[2][k] = T(c.mirrored.z);
+            colliding[0][k] = T(c.colliding.x), colliding[1][k] = T(c.colliding.y), colliding[2][k] = T(c.colliding.z);
             // at or below the surface the factor is at its cap
             inverse_distance[k] = T(c.distance > 1e-9 * unit ? unit / c.distance : 1e9);
         }
         const Vec3<V> n{load<V>(normal[0]), load<V>(normal[1]), load<V>(normal[2])};
-        const Vec3<V> vm{load<V>(mirrored[0]), load<V>(mirrored[1]), load<V>(mirrored[2])};
+        const Vec3<V> vc{load<V>(colliding[0]), load<V>(colliding[1]), load<V>(colliding[2])};
         const V inverse_d = load<V>(inverse_distance);
         Vec3<V> G{zero, zero, zero}, B = G, P = G;
         for (const Index point : list) {
@@ -283,7 +289,7 @@ template <class Model, class V, class T>
             G = G + g;
             B = fma(factor, g, B);
             if constexpr (Model::viscous) {
-                const V approach = max(-(factor * dot(vm, r)), zero);
+                const V approach = max(-(factor * dot(vc, r)), zero);
                 const V pressure = model.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 P = fma(pressure, g, P);
             }

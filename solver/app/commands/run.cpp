@@ -10,6 +10,7 @@
 #include "solver/app/measure.hpp"
 #include "solver/app/simulation.hpp"
 #include "solver/core/simd.hpp"
+#include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <csignal>
@@ -140,6 +141,8 @@ private:
 
     void open()
     {
+        for (const auto& issue : scene::check(scene_, args_.scene.force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
+            if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}: {}\n", issue.key, issue.text);
         io::Path where = args_.output;
         if (where.empty()) where = scene_.output.directory;
         if (where.empty()) where = io::Path("results") / io::Path(args_.scene.file).stem();
