@@ -91,7 +91,8 @@ public:
             const Index n = Index(order.size());
 #pragma omp parallel for schedule(static) if (n > 4096)
             for (Index k = 0; k < n; ++k) spare[k] = column[order[k]];
-            std::fill(spare.begin() + n, spare.end(), 0);
+            // a register that reaches beyond the last particle sees it again: no zero to divide by
+            std::fill(spare.begin() + n, spare.end(), n > 0 ? spare[n - 1] : 0);
             column.swap(spare);
         });
         size_ = Index(order.size());

@@ -4,7 +4,6 @@
 // [1/s], D and W its symmetric and skew parts, K and G bulk and shear modulus [Pa].
 #include "solver/core/tensor.hpp"
 #include "solver/scene/material.hpp"
-#include <limits>
 
 namespace kuzure {
 
@@ -98,7 +97,7 @@ template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const 
     const V overshoot = max(fma(soil.alpha, I1_trial, shear) - soil.k, V(0));
     const V I1 = min(fnma(soil.nine_k_alpha_psi, overshoot * soil.inverse_denominator, I1_trial), soil.apex);
     const V limit = max(fnma(soil.alpha, I1, soil.k), V(0));
-    const V tiny(std::numeric_limits<number<V>>::min());
+    const V tiny(number<V>(1e-280)); // the quotient stays finite
     const V keep = min(limit / max(shear, tiny), one);
     // eps_p = C^-1 (trial - sigma);  sigma : eps_p = keep (1 - keep) J2_tr/G + I1 (I1_tr - I1)/(9 K)
     // keep = 1 in the elastic range gives exactly zero work and strain.

@@ -4,23 +4,42 @@
 #include "io/snapshot.hpp"
 #include "io/summary.hpp"
 #include "solver/app/command.hpp"
+#include "solver/app/simulation.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/material.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <thread>
+#include <omp.h>
 
 namespace kuzure {
 
 namespace {
+
+/// Seconds a directed pair takes here and now, with all cores: a few steps of a small block of the scene's own soil and kernel.
+double measure_pair(const Comm& comm, Scene s)
+{
+    const double edge = (s.dimensions == 3 ? 20 : 90) * s.space.spacing;
+    s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
+    s.walls.clear();
+    s.bodies.resize(1);
+    s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
+    s.time = {1.0, 1e-3 * scene::crossing_time(s)};
+    use_threads(comm, 0);
+    Simulation sim(comm, s);
+    for (int k = 0; k < 3; ++k) sim.step();
+    const auto pairs = sim.pairs();
+    const double begin = omp_get_wtime();
+    for (int k = 0; k < 6; ++k) sim.step();
+    return (omp_get_wtime() - begin) / double(std::max<std::int64_t>(1, sim.pairs() - pairs));
+}
 
 struct Estimate {
     std::int64_t soil, walls, steps;
     double dt, memory, disk, seconds;
 };
 
-Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& model)
+Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& model, double seconds_per_pair)
 {
     Estimate e{};
     e.soil = f.soil_count(), e.walls = f.wall_count();
@@ -44,9 +63,8 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     e.disk = snapshots * double(io::snapshot_bytes(e.soil + e.walls, s.output.fields)) +
              2.0 * double(io::checkpoint_bytes(e.soil, std::size_t(scene::column_bytes(f) / std::max<double>(1, double(e.soil))))) +
              (s.output.history ? s.time.end / *s.output.history * 320 : 0);
-    const double ns = mixed ? 4.0 : 7.0; // per pair and core
-    e.seconds =
-        double(e.steps) * double(e.soil) * (neighbours * 0.93 * ns * 1e-9 + 60e-9) / std::max(1u, std::thread::hardware_concurrency());
+    // lists, sorting and output took 9 % on top of the pass in hirata_52 (docs/performance.md)
+    e.seconds = double(e.steps) * double(e.soil) * neighbours * 0.95 * seconds_per_pair * 1.09;
     return e;
 }
 
@@ -76,7 +94,7 @@ void add_check(CLI::App& app, Action& chosen)
             const Scene s = args->read(comm);
             const scene::Filling filling(s);
             const auto model = choose_model(s, Arithmetic::Lanes);
-            const Estimate e = estimate(s, filling, *model);
+            const Estimate e = estimate(s, filling, *model, measure_pair(comm, s));
             std::vector<std::string> warnings;
             for (const auto& issue : scene::check(s, args->force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
                 warnings.push_back(issue.key + ": " + issue.text);
