@@ -279,19 +279,7 @@ Wishes Simulation::step(Wishes mine)
             });
             const PassResult rim = timers_.timed(Phase::Rim, [&] { return model_->run(pass, lists_.rim()); });
             count_work(Phase::Rim, rim.pairs, lists_.rim().size());
-            const auto add = [](PassResult& a, const PassResult& b) {
-                a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
-                a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
-                a.pairs += b.pairs;
-                auto& e = a.extremes;
-                e = {std::max(e.acceleration2, b.extremes.acceleration2),
-                     std::max(e.signal, b.extremes.signal),
-                     std::max(e.moved2, b.extremes.moved2),
-                     std::max(e.speed2, b.extremes.speed2),
-                     std::max(e.bad, b.extremes.bad),
-                     std::max(e.outside, b.extremes.outside)};
-            };
-            add(result, rim);
+            result.add(rim);
             buffers.now.swap(buffers.next);
             buffers.tension.swap(buffers.next_tension);
         },

@@ -110,7 +110,6 @@ private:
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
     std::size_t row_bytes() const;
     [[noreturn]] void report_failure();
-    double smallest_time_scale() const;
 
     const Comm& comm_;
     Scene scene_;

@@ -480,21 +480,6 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
         }
 }
 
-inline void merge(PassResult& a, const PassResult& b)
-{
-    a.energy.plastic += b.energy.plastic, a.energy.viscous += b.energy.viscous;
-    a.energy.wall += b.energy.wall, a.energy.damping += b.energy.damping;
-    a.pairs += b.pairs;
-    auto& x = a.extremes;
-    const auto& y = b.extremes;
-    x = {max(y.acceleration2, x.acceleration2),
-         max(y.signal, x.signal),
-         max(y.moved2, x.moved2),
-         max(y.speed2, x.speed2),
-         max(y.bad, x.bad),
-         max(y.outside, x.outside)};
-}
-
 } // namespace pass
 
 /// A model compiled for one number type of the pair sums.
@@ -542,7 +527,7 @@ private:
 #pragma omp for schedule(dynamic, 32) nowait
             for (std::int64_t k = 0; k < n; ++k) one_cluster(p, clusters[k], mine);
 #pragma omp critical
-            pass::merge(total, mine.result());
+            total.add(mine.result());
         }
         return total;
     }

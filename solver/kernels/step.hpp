@@ -69,6 +69,22 @@ struct PassResult {
     EnergySums energy;
     Extremes extremes;
     std::int64_t pairs = 0;
+
+    /// What two passes, or two threads of one, report together.
+    void add(const PassResult& o)
+    {
+        energy.plastic += o.energy.plastic, energy.viscous += o.energy.viscous;
+        energy.wall += o.energy.wall, energy.damping += o.energy.damping;
+        pairs += o.pairs;
+        Extremes& x = extremes;
+        const Extremes& y = o.extremes;
+        x = {max(y.acceleration2, x.acceleration2),
+             max(y.signal, x.signal),
+             max(y.moved2, x.moved2),
+             max(y.speed2, x.speed2),
+             max(y.bad, x.bad),
+             max(y.outside, x.outside)};
+    }
 };
 
 enum class Arithmetic { Lanes, Plain };
