@@ -65,14 +65,19 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         prepare();
         cut_by_counts();
         fill();
+        if (options_.initial) options_.initial(particles_);
+        double fastest = 0;
+        for (Index i = 0; i < particles_.size(); ++i) {
+            const Vector v = std::as_const(particles_)[field::velocity][i];
+            fastest = std::max(fastest, dot(v, v));
+        }
+        clock_.extremes.speed2 = comm_.max(fastest);
+        if (options_.initial) widen_energy_unit();
         const double unit = clock_.energy_unit * 65536;
         const auto e = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, unit);
         clock_.energy_at_start = e.kinetic + e.potential + e.elastic;
         clock_.extremes.acceleration2 = dot(forces_.gravity, forces_.gravity);
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
-        double fastest = 0;
-        for (const auto& b : scene_.bodies) fastest = std::max(fastest, dot(b.velocity, b.velocity));
-        clock_.extremes.speed2 = fastest;
     });
 }
 
@@ -127,6 +132,15 @@ void Simulation::prepare()
         }
         clock_.energy_unit = std::exp2(std::floor(std::log2(scale)) - 58);
     }
+}
+
+void Simulation::widen_energy_unit()
+{
+    // Particles may have been made faster than the scene says.
+    double mass = 0;
+    for (const auto& m : soils_) mass = std::max(mass, m.density * scene_.particle_volume() * double(filling_.soil_count()));
+    const double scale = mass * clock_.extremes.speed2;
+    if (scale > 0) clock_.energy_unit = std::max(clock_.energy_unit, std::exp2(std::floor(std::log2(scale)) - 58));
 }
 
 void Simulation::cut_by_counts()

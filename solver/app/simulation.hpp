@@ -18,6 +18,9 @@ struct RunOptions {
     Arithmetic arithmetic = Arithmetic::Lanes;
     int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
     int blocks_per_rank = 50;
+    /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say. Velocity, density and
+    /// stress have half-step twins, which must be set alike.
+    std::function<void(Particles&)> initial = {};
 };
 
 /// What a rank wants to happen after a step; travels with the step's only reduction.
@@ -95,6 +98,7 @@ private:
     };
 
     void prepare();
+    void widen_energy_unit();
     void fill();
     void cut_by_counts();
     void recut();
