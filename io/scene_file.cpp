@@ -455,6 +455,18 @@ template <class A> void describe(A& a, Scene& s)
         a.angle(path + ".dilation_angle", soil.dilation_angle);
         a.choice(path + ".cone", soil.cone);
         a.number(path + ".tension_cutoff", soil.tension_cutoff);
+        a.number(path + ".dilation_decay", soil.dilation_decay);
+        a.table(path + ".softening", soil.softening, [&](auto& v) {
+            a.number(path + ".softening.cohesion", v.cohesion);
+            a.angle(path + ".softening.friction_angle", v.friction_angle);
+            a.number(path + ".softening.slip", v.slip);
+        });
+        a.table(path + ".rate_friction", soil.rate_friction, [&](auto& v) {
+            a.angle(path + ".rate_friction.friction_angle", v.friction_angle);
+            a.number(path + ".rate_friction.inertial_number", v.inertial_number);
+            a.number(path + ".rate_friction.grain", v.grain);
+            a.number(path + ".rate_friction.grain_density", v.grain_density);
+        });
     });
     a.tables("body", s.bodies, [&](const std::string& path, scene::Body& body) {
         a.soil_of(path + ".soil", body.soil, s.soils);
@@ -476,6 +488,12 @@ template <class A> void describe(A& a, Scene& s)
     a.automatic("effects.artificial_stress", s.effects.artificial_stress, s.effects.artificial_stress_decision, [&](auto& v) {
         a.number("effects.artificial_stress.epsilon", v.epsilon);
         a.number("effects.artificial_stress.exponent", v.exponent);
+    });
+    a.automatic("effects.stress_diffusion", s.effects.stress_diffusion, s.effects.stress_diffusion_decision,
+                [&](auto& v) { a.number("effects.stress_diffusion.zeta", v.zeta); });
+    a.table("effects.pore_pressure", s.effects.pore_pressure, [&](auto& v) {
+        a.points("effects.pore_pressure.table", v.table);
+        a.number("effects.pore_pressure.density", v.density);
     });
     a.table("effects.damping", s.effects.damping, [&](auto& v) {
         a.number("effects.damping.ratio", v.ratio);

@@ -4,7 +4,8 @@
 
 namespace kuzure {
 
-StateEnergy state_energy(const Team& team, const Particles& p, std::span<const Material> soils, double volume, Vector gravity, double unit)
+StateEnergy state_energy(const Team& team, const Particles& p, std::span<const Material> soils, double volume, Vector gravity,
+                         const PoreWater& water, double unit)
 {
     const auto x = p[field::position], o = p[field::origin], v = p[field::velocity];
     const auto s = p[field::stress];
@@ -19,7 +20,8 @@ StateEnergy state_energy(const Team& team, const Particles& p, std::span<const M
         const Material& m = soils[soil[i]];
         const double mass = m.density * volume;
         kinetic += quantized(0.5 * mass * dot(v[i], v[i]));
-        potential += quantized(-mass * dot(gravity, x[i] - o[i]));
+        potential +=
+            quantized(-mass * dot(gravity, x[i] - o[i]) + (water.present() ? volume * (water.at(x[i]).value - water.at(o[i]).value) : 0.0));
         // sigma : C^-1 : sigma/2 = J2/(2 G) + I1^2/(18 K)
         const Stress sigma = s[i];
         const double I1 = trace(sigma);

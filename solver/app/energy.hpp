@@ -7,7 +7,8 @@
 
 namespace kuzure {
 
-/// The energies that are functions of the state, J (J/m in 2-D). Potential counts from the particles' origins.
+/// The energies that are functions of the state, J (J/m in 2-D). Potential, of weight and of still pore water, counts from
+/// the particles' origins.
 struct StateEnergy {
     double kinetic = 0, potential = 0, elastic = 0;
 };
@@ -34,7 +35,8 @@ struct Ledger {
 };
 
 /// Collective. Energies of the present state; `unit` (J) must be a power of two far below them.
-StateEnergy state_energy(const Team&, const Particles&, std::span<const Material>, double volume, Vector gravity, double unit);
+StateEnergy state_energy(const Team&, const Particles&, std::span<const Material>, double volume, Vector gravity, const PoreWater&,
+                         double unit);
 
 /// Collective. 64-bit hash over all particles by id, of every column that the next step needs; -0 counts as +0.
 std::string state_hash(const Team&, const Particles&);

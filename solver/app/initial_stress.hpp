@@ -1,5 +1,6 @@
 #pragma once
 // Stress "at rest": the weight of the soil above a point, and K0 times it sideways.
+#include "solver/physics/terms.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/material.hpp"
 
@@ -7,7 +8,8 @@ namespace kuzure {
 
 class InitialStress {
 public:
-    InitialStress(const Scene& s, const scene::Filling& f, std::span<const Material> soils) : scene_(s), filling_(f), soils_(soils)
+    InitialStress(const Scene& s, const scene::Filling& f, std::span<const Material> soils)
+        : scene_(s), filling_(f), soils_(soils), water_(PoreWater::from(s))
     {
         gravity_ = s.effects.gravity ? -s.effects.gravity->z : 0;
     }
@@ -23,6 +25,7 @@ public:
                                       const double part = above.z < x.z + 0.25 * dx ? 0.5 : 1.0;
                                       load += part * soils_[scene_.bodies[body].soil].density * gravity_ * dx;
                                   });
+        load -= water_.at(x).value; // what the water carries is not the skeleton's
         if (load <= 0) return {};
         const Material& m = soils_[soil];
         // K0 from K and G: nu/(1 - nu) = (3 K - 2 G)/(3 K + 4 G)
@@ -39,6 +42,7 @@ private:
     const scene::Filling& filling_;
     std::span<const Material> soils_;
     double gravity_;
+    PoreWater water_;
 };
 
 } // namespace kuzure

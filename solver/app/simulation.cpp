@@ -74,7 +74,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         clock_.extremes.speed2 = comm_.max(fastest);
         if (options_.initial) widen_energy_unit();
         const double unit = clock_.energy_unit * 65536;
-        const auto e = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, unit);
+        const auto e = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, water_, unit);
         clock_.energy_at_start = e.kinetic + e.potential + e.elastic;
         clock_.extremes.acceleration2 = dot(forces_.gravity, forces_.gravity);
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
@@ -112,6 +112,8 @@ void Simulation::prepare()
     reach_ = scene_.support() * (1 + scene_.accuracy.skin);
     skin_ = scene_.support() * scene_.accuracy.skin;
     forces_.gravity = scene_.effects.gravity.value_or(Vector{});
+    water_ = PoreWater::from(scene_);
+    for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
     particles_.require(field::position, field::velocity, field::half_velocity, field::density, field::half_density, field::stress,
                        field::half_stress, field::plastic_strain, field::sorted_position, field::origin, field::id, field::soil);
     // Denormals are flushed in every thread, whatever ran before.
@@ -262,6 +264,8 @@ Wishes Simulation::step(Wishes mine)
                          .dt = dt,
                          .kick = 0.5 * (clock_.dt + dt),
                          .forces = forces_,
+                         .water = water_.present() ? &water_ : nullptr,
+                         .evolving = evolving_,
                          .energy_unit = clock_.energy_unit,
                          .low = scene_.space.low,
                          .high = scene_.space.high};
@@ -309,10 +313,11 @@ Wishes Simulation::step(Wishes mine)
     clock_.dt = dt;
     timers_.timed(Phase::Reduce, [&] {
         Extremes& e = result.extremes;
-        double all[] = {e.acceleration2, e.signal, e.moved2, e.speed2, e.bad, e.outside, double(mine.stop), double(mine.checkpoint)};
+        double all[] = {e.acceleration2,        e.signal, e.moved2, e.speed2, e.bad, e.outside, e.strained, double(mine.stop),
+                        double(mine.checkpoint)};
         comm_.max(std::span<double>(all));
-        clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5]};
-        mine = {all[6] != 0, all[7] != 0};
+        clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5], all[6]};
+        mine = {all[7] != 0, all[8] != 0};
     });
     if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0 || outran()) report_failure();
     return mine;
@@ -565,7 +570,7 @@ void Simulation::make_records()
 Ledger Simulation::ledger() const
 {
     Ledger l;
-    l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, clock_.energy_unit * 65536);
+    l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), forces_.gravity, water_, clock_.energy_unit * 65536);
     const auto& d = clock_.dissipated;
     std::int64_t units[] = {d.plastic, d.viscous, d.wall, d.damping};
     comm_.sum(std::span<std::int64_t>(units));

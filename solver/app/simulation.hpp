@@ -135,6 +135,8 @@ private:
     std::optional<scene::Box> wall_region_;
     std::variant<Buffers<double>, Buffers<float>> buffers_;
     StepForces forces_;
+    PoreWater water_;
+    bool evolving_ = false;
     double reach_, skin_; // m
     Clock clock_;
     bool built_ = false;

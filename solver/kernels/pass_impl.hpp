@@ -57,12 +57,15 @@ template <class V> struct Here {
 };
 
 /// Sums of one cluster, in double, ready for the update: rows of W lanes.
-template <int W, bool Tensile> struct alignas(64) Sums {
-    double grad_v[9][W];              // sum V_j (v_j - v_i) (x) shape r
-    double force[3][W];               // sum V_j (sigma_j - rho_i rho_j Pi) . shape r
-    double grad_one[3][W];            // sum V_j shape r
-    double power[W];                  // sum V_j rho_i rho_j Pi approach shape
-    double close[Tensile ? 3 : 1][W]; // sum V_j f^n shape r
+template <int W, class Model> struct alignas(64) Sums {
+    double grad_v[9][W];                           // sum V_j (v_j - v_i) (x) shape r
+    double force[3][W];                            // sum V_j (sigma_j - rho_i rho_j Pi) . shape r
+    double grad_one[3][W];                         // sum V_j shape r
+    double power[W];                               // sum V_j rho_i rho_j Pi approach shape
+    double close[Model::tensile ? 3 : 1][W];       // sum V_j f^n shape r
+    double pushed[Model::tensile ? 3 : 1][W];      // sum V_j f^n tau_j . shape r
+    double diffusion[Model::diffusive ? 8 : 1][W]; // sum q sigma_j, sum q, sum q g.r;  q = V_j shape r^2/(r^2 + 0.01 h^2)
+    double moment[Model::corrected ? 6 : 1][W];    // sum V_j shape r (x) r
 };
 
 template <class V> KUZURE_INLINE V load_narrow(const double* p)
@@ -109,20 +112,21 @@ template <class V, class T> Positions<V> positions_of(const Record<T>* records, 
 /// The pair sums of one cluster with its soil neighbours; returns the pairs inside the support.
 template <class Model, class V, class T>
 KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, std::span<const Index> list, const Record<T>* records,
-                                         const Tension<T>* tension, Index far_away, Sums<width<V>, Model::tensile>& out)
+                                         const Tension<T>* tension, Index far_away, Sums<width<V>, Model>& out)
 {
     constexpr int batch = 16, room = 256;
     const V support(T(2 * model.kernel.h)), support2(T(4 * model.kernel.h * model.kernel.h));
     const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0));
     struct alignas(64) Terms {
-        Vec3<V> grad, v;
-        V pressure, close;
+        Vec3<V> grad, v, r;
+        V pressure, close, q, along;
     };
     Terms terms[batch];
     Index near[room + batch];
     Mat3<V> L{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
-    Vec3<V> A{zero, zero, zero}, G = A, F = A;
-    V power = zero;
+    Vec3<V> A{zero, zero, zero}, G = A, F = A, B = A;
+    Sym3<V> S{zero, zero, zero, zero, zero, zero}, M = S;
+    V power = zero, Q = zero, Qg = zero;
     std::int64_t pairs = 0;
 
     for (std::size_t begin = 0; begin < list.size(); begin += room) {
@@ -162,6 +166,12 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
                     power = fma(pressure * w, approach, power);
                 }
                 if constexpr (Model::tensile) terms[k].close = model.kernel.value(t);
+                if constexpr (Model::diffusive) {
+                    terms[k].q = w * (r2 * (inv.inverse * rho_sum));
+                    const Vector g = model.stress_diffusion.gravity;
+                    terms[k].along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+                }
+                if constexpr (Model::corrected) terms[k].r = r;
             }
             // ---- grad v = sum_j V_j (v_j - v_i) (x) grad W
             for (int k = 0; k < m; ++k) {
@@ -182,13 +192,30 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
                     for (int l = 0; l < i.count && !any; ++l) any = tension[i.first + l].any != 0;
                     if (any) {
                         const V f = model.artificial_stress.closeness(terms[k].close);
-                        s = fma(f, Sym3<V>{V(tj.xx), V(tj.yy), V(tj.zz), V(tj.xy), V(tj.yz), V(tj.xz)}, s);
-                        F = fma(f, g, F);
+                        const Vec3<V> near_j = f * g;
+                        B = B + Sym3<V>{V(tj.xx), V(tj.yy), V(tj.zz), V(tj.xy), V(tj.yz), V(tj.xz)} * near_j;
+                        F = F + near_j;
                     }
                 }
                 A = A + s * g;
                 G = G + g;
             }
+            // ---- stress diffusion: sum_j V_j (sigma_i - sigma_j - static part) x_ij . grad W/(r^2 + 0.01 h^2)
+            if constexpr (Model::diffusive)
+                for (int k = 0; k < m; ++k) {
+                    const Record<T>& j = records[near[b + k]];
+                    const V q = terms[k].q;
+                    S = fma(q, Sym3<V>{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)}, S);
+                    Q = Q + q;
+                    Qg = fma(q, terms[k].along, Qg);
+                }
+            // ---- M = sum_j V_j (x_j - x_i) (x) grad W
+            if constexpr (Model::corrected)
+                for (int k = 0; k < m; ++k) {
+                    const Vec3<V> g = terms[k].grad, r = terms[k].r;
+                    M = {fma(g.x, r.x, M.xx), fma(g.y, r.y, M.yy), fma(g.z, r.z, M.zz),
+                         fma(g.x, r.y, M.xy), fma(g.y, r.z, M.yz), fma(g.x, r.z, M.xz)};
+                }
         }
     }
     const V* rows[] = {&L.x.x, &L.x.y, &L.x.z, &L.y.x, &L.y.y, &L.y.z, &L.z.x, &L.z.y, &L.z.z};
@@ -196,11 +223,22 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
     store_wide(out.force[0], A.x), store_wide(out.force[1], A.y), store_wide(out.force[2], A.z);
     store_wide(out.grad_one[0], G.x), store_wide(out.grad_one[1], G.y), store_wide(out.grad_one[2], G.z);
     store_wide(out.power, power);
-    if constexpr (Model::tensile) store_wide(out.close[0], F.x), store_wide(out.close[1], F.y), store_wide(out.close[2], F.z);
+    if constexpr (Model::tensile) {
+        store_wide(out.close[0], F.x), store_wide(out.close[1], F.y), store_wide(out.close[2], F.z);
+        store_wide(out.pushed[0], B.x), store_wide(out.pushed[1], B.y), store_wide(out.pushed[2], B.z);
+    }
+    if constexpr (Model::diffusive) {
+        const V* sums[] = {&S.xx, &S.yy, &S.zz, &S.xy, &S.yz, &S.xz, &Q, &Qg};
+        for (int k = 0; k < 8; ++k) store_wide(out.diffusion[k], *sums[k]);
+    }
+    if constexpr (Model::corrected) {
+        const V* sums[] = {&M.xx, &M.yy, &M.zz, &M.xy, &M.yz, &M.xz};
+        for (int k = 0; k < 6; ++k) store_wide(out.moment[k], *sums[k]);
+    }
     return pairs;
 }
 
-/// How one particle feels one wall: the surface's distance and normal, what its velocity and stress look like there.
+/// How one particle feels one wall: the surface's distance and normal, and what its velocity and stress look like there.
 struct WallContact {
     double distance;
     Vector normal, mirrored; // m, 1, m/s: the velocity that the wall mirrors,
@@ -213,30 +251,35 @@ inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, con
     const auto c = scene::contact(wall.shape, x, dimensions);
     WallContact w{c.distance, c.normal, v, v, s};
     if (wall.surface == scene::Surface::Rough) return w;
-    // sigma = ... + tau (x) n + n (x) tau: the shear that the surface carries is tau = sigma.n - (n.sigma.n) n
-    const Vector n = c.normal, traction = s * n;
-    const double normal = dot(n, traction);
-    const Vector tau = traction - normal * n;
-    double keep = 0;
+    const Vector n = c.normal;
     w.colliding = dot(v, n) * n;
-    if (wall.surface == scene::Surface::Coulomb) {
-        const double shear = length(tau), limit = std::tan(wall.friction_angle) * std::max(-normal, 0.0);
-        keep = shear > limit ? limit / shear : 1.0;
-    } else {
-        w.mirrored = w.colliding;
-    }
-    const double lost = 1 - keep;
-    w.stress = s - Stress{lost * 2 * tau.x * n.x,
-                          lost * 2 * tau.y * n.y,
-                          lost * 2 * tau.z * n.z,
-                          lost * (tau.x * n.y + tau.y * n.x),
-                          lost * (tau.y * n.z + tau.z * n.y),
-                          lost * (tau.x * n.z + tau.z * n.x)};
-    // A surface that slides does not pull: tension across it would hold one end while the other presses, and rub more
-    // than the weight allows.
-    if (wall.surface == scene::Surface::Coulomb && normal > 0)
-        w.stress = w.stress - normal * Stress{n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.x * n.z};
+    if (wall.surface == scene::Surface::Coulomb) return w;
+    // Free slip: no shear crosses the surface, sigma - (tau (x) n + n (x) tau) with tau = sigma.n - (n.sigma.n) n
+    w.mirrored = w.colliding;
+    const Vector traction = s * n;
+    const Vector tau = traction - dot(n, traction) * n;
+    w.stress = s - Stress{2 * tau.x * n.x,           2 * tau.y * n.y,           2 * tau.z * n.z,
+                          tau.x * n.y + tau.y * n.x, tau.y * n.z + tau.z * n.y, tau.x * n.z + tau.z * n.x};
     return w;
+}
+
+/// Coulomb's law for the force density (N/m^3) a particle gets from a surface: what would hold it is cut to tan(delta)
+/// times the force along the normal, and a surface that pulls lets go. Holding force: the no-slip wall's stress, and
+/// against the slip v_t the impedance rho c_p of the soil, without which shear stress would first have to build up in
+/// every layer that the wall touches, and sliding would feel less than its friction.
+struct WallFriction {
+    Vector force;
+    double hold; // share of the holding shear that is left: 1 sticks, 0 slides freely
+    bool pulls;
+};
+inline WallFriction limit_to_friction(Vector force, Vector normal, double friction_angle, Vector slip, double impedance)
+{
+    const double pressing = dot(force, normal);
+    if (!(pressing > 0)) return {{}, 0, true};
+    const Vector shear = force - pressing * normal - impedance * slip;
+    const double held = length(shear), limit = std::tan(friction_angle) * pressing;
+    const double hold = held > limit ? limit / held : 1.0;
+    return {pressing * normal + hold * shear, hold, false};
 }
 
 /// Adds the walls' share to the sums of a cluster; returns the pairs inside the support and the power that walls take.
@@ -244,8 +287,7 @@ inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, con
 /// 1997; Bui et al. 2008, eq. 45), the factor 1 + d_B/d_A capped at 1.5.
 template <class Model, class V, class T>
 [[gnu::noinline]] std::int64_t sum_over_walls(const Model& model, const Here<V>& i, const Pass<T>& pass, std::span<const Index> runs,
-                                              double unit, int dimensions, double scale, Sums<width<V>, Model::tensile>& out,
-                                              double* wall_power)
+                                              double unit, int dimensions, double scale, Sums<width<V>, Model>& out, double* wall_power)
 {
     constexpr int W = width<V>;
     const auto& p = *pass.particles;
@@ -273,6 +315,7 @@ template <class Model, class V, class T>
         const Vec3<V> vc{load<V>(colliding[0]), load<V>(colliding[1]), load<V>(colliding[2])};
         const V inverse_d = load<V>(inverse_distance);
         Vec3<V> G{zero, zero, zero}, B = G, P = G;
+        Sym3<V> M{zero, zero, zero, zero, zero, zero};
         for (const Index point : list) {
             const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
             const V r2_exact = dot(r, r), r2 = max(r2_exact, tiny);
@@ -293,29 +336,52 @@ template <class Model, class V, class T>
                 const V pressure = model.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 P = fma(pressure, g, P);
             }
+            if constexpr (Model::corrected)
+                M = {fma(g.x, r.x, M.xx), fma(g.y, r.y, M.yy), fma(g.z, r.z, M.zz),
+                     fma(g.x, r.y, M.xy), fma(g.y, r.z, M.yz), fma(g.x, r.z, M.xz)};
         }
         double sums[9][W];
         const V* rows[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
         for (int k = 0; k < 9; ++k) store_wide(sums[k], *rows[k]);
+        double moment[6][W];
+        if constexpr (Model::corrected) {
+            const V* of[] = {&M.xx, &M.yy, &M.zz, &M.xy, &M.yz, &M.xz};
+            for (int k = 0; k < 6; ++k) store_wide(moment[k], *of[k]);
+        }
         for (int k = 0; k < i.count; ++k) {
             const WallContact& c = contact[k];
             const Index at = i.first + k;
             const Vector g{pass.volume * sums[0][k], pass.volume * sums[1][k], pass.volume * sums[2][k]};
-            const Vector b{pass.volume * sums[3][k], pass.volume * sums[4][k], pass.volume * sums[5][k]};
+            Vector b{pass.volume * sums[3][k], pass.volume * sums[4][k], pass.volume * sums[5][k]};
             const Vector q{pass.volume * sums[6][k], pass.volume * sums[7][k], pass.volume * sums[8][k]};
-            const Vector elastic = 2.0 * (c.stress * g);
-            out.force[0][k] += elastic.x - q.x, out.force[1][k] += elastic.y - q.y, out.force[2][k] += elastic.z - q.z;
-            const double vk[3] = {-c.mirrored.x, -c.mirrored.y, -c.mirrored.z};
+            Vector force = 2.0 * (c.stress * g) - q, mirrored = c.mirrored;
+            bool felt = true;
+            if (wall.wall->surface == scene::Surface::Coulomb) {
+                // scale, the kernel's constant, is negative: the force on the particle points along scale * force
+                const Vector slip = mirrored - c.colliding;
+                const double impedance = p[field::density][at] * pass.records[at].sound_speed * length(scale * g);
+                const auto limited = limit_to_friction(scale * force, c.normal, wall.wall->friction_angle, slip, impedance);
+                force = (1 / scale) * limited.force;
+                // Where the surface slides, the soil beside it is dragged that much less.
+                mirrored = c.colliding + limited.hold * slip;
+                felt = !limited.pulls;
+            }
+            if (!felt) b = {};
+            out.force[0][k] += force.x, out.force[1][k] += force.y, out.force[2][k] += force.z;
+            const double vk[3] = {-mirrored.x, -mirrored.y, -mirrored.z};
             for (int a = 0; a < 3; ++a) {
                 out.grad_v[3 * a][k] = fma(vk[a], b.x, out.grad_v[3 * a][k]);
                 out.grad_v[3 * a + 1][k] = fma(vk[a], b.y, out.grad_v[3 * a + 1][k]);
                 out.grad_v[3 * a + 2][k] = fma(vk[a], b.z, out.grad_v[3 * a + 2][k]);
             }
+            if constexpr (Model::corrected)
+                if (felt)
+                    for (int a = 0; a < 6; ++a) out.moment[a][k] = fma(pass.volume, moment[a][k], out.moment[a][k]);
             // taken by the wall per unit of rho_i V_i/m_i: -(v.f + sigma : L_wall); viscous: v.q
             const Stress s = sigma[at];
             const Vector sb = s * b;
-            const double stress_power = -(c.mirrored.x * sb.x + c.mirrored.y * sb.y + c.mirrored.z * sb.z);
-            wall_power[k] -= scale * (dot(v[at], elastic - q) + stress_power);
+            const double stress_power = -(mirrored.x * sb.x + mirrored.y * sb.y + mirrored.z * sb.z);
+            wall_power[k] -= scale * (dot(v[at], force) + stress_power);
         }
     }
     return pairs;
@@ -324,7 +390,7 @@ template <class Model, class V, class T>
 /// Energies and extremes of the clusters one thread has done, a lane each.
 template <class U> struct Accumulated {
     U plastic{0.0}, viscous{0.0}, wall{0.0}, damping{0.0};
-    U acceleration2{0.0}, signal{0.0}, moved2{0.0}, speed2{0.0};
+    U acceleration2{0.0}, signal{0.0}, moved2{0.0}, speed2{0.0}, strained{0.0};
     U not_finite{0.0}; // zero, or not a number
     double outside = 0;
     std::int64_t pairs = 0;
@@ -332,10 +398,33 @@ template <class U> struct Accumulated {
     {
         // exact sums: their order does not count
         return {{sum(plastic), sum(viscous), sum(wall), sum(damping)},
-                {largest(acceleration2), largest(signal), largest(moved2), largest(speed2), sum(not_finite) == 0 ? 0.0 : 1.0, outside},
+                {largest(acceleration2), largest(signal), largest(moved2), largest(speed2), sum(not_finite) == 0 ? 0.0 : 1.0, outside,
+                 largest(strained)},
                 pairs};
     }
 };
+
+/// One number a lane, or one struct of lanes, from what `of(lane)` gives for each.
+template <class U, class Of> KUZURE_INLINE U lane_by_lane(Of of)
+{
+    double row[width<U>];
+    for (int k = 0; k < width<U>; ++k) row[k] = of(k);
+    return load<U>(row);
+}
+template <template <class> class Struct, class U, class Of> KUZURE_INLINE Struct<U> lane_by_lane(Of of)
+{
+    constexpr int members = sizeof(Struct<double>) / sizeof(double);
+    double table[members][width<U>], one[members];
+    for (int k = 0; k < width<U>; ++k) {
+        const Struct<double> s = of(k);
+        std::memcpy(one, &s, sizeof s);
+        for (int q = 0; q < members; ++q) table[q][k] = one[q];
+    }
+    Struct<U> all;
+    static_assert(sizeof all == sizeof table);
+    std::memcpy(&all, table, sizeof table);
+    return all;
+}
 
 /// Rounds to a multiple of the unit that `magic` stands for (1.5 * 2^52 units): what is summed then is summed exactly.
 template <class U> KUZURE_INLINE U quantized(U x, U magic) { return (x + magic) - magic; }
@@ -343,8 +432,8 @@ template <class U> KUZURE_INLINE U quantized(U x, U magic) { return (x + magic) 
 /// The constitutive law and the leap-frog of the first n lanes at particle `at`; `row` is the lane offset in the sums.
 /// Legend: half-step values carry _h; those at the step's end are predicted from them with half a step of the rates.
 template <class U, class Model, class T, int W>
-KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W, Model::tensile>& sums, const double* wall_power, int row,
-                           Index at, int n, double scale, const Places<T>& place, Accumulated<U>& total)
+KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W, Model>& sums, const double* wall_power, int row, Index at,
+                           int n, double scale, double unit, int dimensions, const Places<T>& place, Accumulated<U>& total)
 {
     auto& p = *pass.particles;
     const auto vx = p[field::velocity], vh = p[field::half_velocity], xx = p[field::position], x_sorted = p[field::sorted_position];
@@ -357,34 +446,30 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     // ---- material of each lane
     Elastoplastic<U> soil;
     U c, rho0;
+    const auto material = [&](int k) -> const Material& {
+        return pass.soils.size() == 1 ? pass.soils[0] : pass.soils[soil_of[at + std::min(k, n - 1)]];
+    };
     if (pass.soils.size() == 1) {
         soil = Elastoplastic<U>::from(pass.soils[0]);
         c = U(pass.soils[0].sound_speed), rho0 = U(pass.soils[0].density);
     } else {
-        double table[9][width<U>];
-        for (int k = 0; k < width<U>; ++k) {
-            const Material& m = pass.soils[soil_of[at + std::min(k, n - 1)]];
-            const auto e = Elastoplastic<double>::from(m);
-            const double row_of[9] = {e.shear, e.bulk,        e.alpha,  e.k, e.nine_k_alpha_psi, e.inverse_denominator,
-                                      e.apex,  m.sound_speed, m.density};
-            for (int q = 0; q < 9; ++q) table[q][k] = row_of[q];
-        }
-        soil = {load<U>(table[0]), load<U>(table[1]), load<U>(table[2]), load<U>(table[3]),
-                load<U>(table[4]), load<U>(table[5]), load<U>(table[6])};
-        c = load<U>(table[7]), rho0 = load<U>(table[8]);
+        soil = lane_by_lane<Elastoplastic, U>([&](int k) { return Elastoplastic<double>::from(material(k)); });
+        c = lane_by_lane<U>([&](int k) { return material(k).sound_speed; });
+        rho0 = lane_by_lane<U>([&](int k) { return material(k).density; });
     }
 
     const Sym3<U> sigma = sp.template load<U>(at);
     const U rho = rp.template load<U>(at);
     const U inverse_rho = one / rho;
     const auto sum = [&](const double(&rows)[W]) { return load<U>(rows + row); };
-    const Mat3<U> L{{factor * sum(sums.grad_v[0]), factor * sum(sums.grad_v[1]), factor * sum(sums.grad_v[2])},
-                    {factor * sum(sums.grad_v[3]), factor * sum(sums.grad_v[4]), factor * sum(sums.grad_v[5])},
-                    {factor * sum(sums.grad_v[6]), factor * sum(sums.grad_v[7]), factor * sum(sums.grad_v[8])}};
+    Mat3<U> L{{factor * sum(sums.grad_v[0]), factor * sum(sums.grad_v[1]), factor * sum(sums.grad_v[2])},
+              {factor * sum(sums.grad_v[3]), factor * sum(sums.grad_v[4]), factor * sum(sums.grad_v[5])},
+              {factor * sum(sums.grad_v[6]), factor * sum(sums.grad_v[7]), factor * sum(sums.grad_v[8])}};
     const Vec3<U> A{sum(sums.force[0]), sum(sums.force[1]), sum(sums.force[2])};
     const Vec3<U> G{sum(sums.grad_one[0]), sum(sums.grad_one[1]), sum(sums.grad_one[2])};
     const Vec3<U> v = vx.template load<U>(at);
     Vec3<U> f = A + sigma * G;
+    U stressed = zero; // power of the artificial stress, W/m^3
     if constexpr (Model::tensile) {
         const Vec3<U> F{sum(sums.close[0]), sum(sums.close[1]), sum(sums.close[2])};
         double tau[6][width<U>];
@@ -393,22 +478,64 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
             const double of[6] = {t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
             for (int q = 0; q < 6; ++q) tau[q][k] = of[q];
         }
-        f = f + Sym3<U>{load<U>(tau[0]), load<U>(tau[1]), load<U>(tau[2]), load<U>(tau[3]), load<U>(tau[4]), load<U>(tau[5])} * F;
+        const Vec3<U> own =
+            Sym3<U>{load<U>(tau[0]), load<U>(tau[1]), load<U>(tau[2]), load<U>(tau[3]), load<U>(tau[4]), load<U>(tau[5])} * F;
+        const Vec3<U> theirs{sum(sums.pushed[0]), sum(sums.pushed[1]), sum(sums.pushed[2])};
+        f = f + (own + theirs);
+        stressed = factor * dot(v, own + theirs);
+    }
+
+    // ---- effects of the particle alone
+    if constexpr (Model::corrected)
+        if (model.correct) {
+            const U to_m = U(-unit) * factor; // the sums hold r = x_i - x_j in `unit`
+            Sym3<U> M{to_m * sum(sums.moment[0]), to_m * sum(sums.moment[1]), to_m * sum(sums.moment[2]),
+                      to_m * sum(sums.moment[3]), to_m * sum(sums.moment[4]), to_m * sum(sums.moment[5])};
+            const Sym3<U> correction = GradientCorrection::inverse(M, dimensions);
+            L = {correction * L.x, correction * L.y, correction * L.z};
+        }
+    // Stress rate of the diffusion, Pa/s
+    Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
+    U diffused = zero; // its power, W/m^3
+    if constexpr (Model::diffusive) {
+        const U speed = lane_by_lane<U>([&](int k) { return material(k).rod_speed; });
+        const U K0 = lane_by_lane<U>([&](int k) { return material(k).at_rest; });
+        const U strength = U(2 * model.stress_diffusion.zeta * pass.h * scale / unit) * speed;
+        const Sym3<U> S{sum(sums.diffusion[0]), sum(sums.diffusion[1]), sum(sums.diffusion[2]),
+                        sum(sums.diffusion[3]), sum(sums.diffusion[4]), sum(sums.diffusion[5])};
+        const Sym3<U> rest = model.stress_diffusion.at_rest(K0);
+        const U along = U(unit) * sum(sums.diffusion[7]);
+        diffusion = strength * fma(rho0 * along, rest, sum(sums.diffusion[6]) * sigma - S);
+        // sigma : C^-1 : D = s : dev(D)/(2 G) + I1 tr(D)/(9 K)
+        const Sym3<U> s = deviator(sigma);
+        diffused = contract(s, diffusion) / (soil.shear + soil.shear) + trace(sigma) * trace(diffusion) / (U(9.0) * soil.bulk);
+    }
+    Vec3<U> body{U(pass.forces.gravity.x), U(pass.forces.gravity.y), U(pass.forces.gravity.z)};
+    if (pass.water) {
+        // rho_0 a = -grad p_w: with the reference density the force has the potential V_0 p_w
+        const auto pressure = [&](int k) { return pass.water->at(xx[at + std::min(k, n - 1)]).gradient; };
+        body.x = body.x - lane_by_lane<U>([&](int k) { return pressure(k).x; }) / rho0;
+        body.z = body.z - lane_by_lane<U>([&](int k) { return pressure(k).z; }) / rho0;
     }
 
     // dv/dt = f/rho + g - mu_d v
     const U mu_d(pass.forces.damping);
-    const Vec3<U> a{fnma(mu_d, v.x, fma(factor * inverse_rho, f.x, U(pass.forces.gravity.x))),
-                    fnma(mu_d, v.y, fma(factor * inverse_rho, f.y, U(pass.forces.gravity.y))),
-                    fnma(mu_d, v.z, fma(factor * inverse_rho, f.z, U(pass.forces.gravity.z)))};
+    const Vec3<U> a{fnma(mu_d, v.x, fma(factor * inverse_rho, f.x, body.x)), fnma(mu_d, v.y, fma(factor * inverse_rho, f.y, body.y)),
+                    fnma(mu_d, v.z, fma(factor * inverse_rho, f.z, body.z))};
     // drho/dt = -rho tr L
     const U rho_rate = -(rho * trace(L));
     const Sym3<U> D = symmetric_part(L);
+    if (pass.evolving) {
+        const auto evolution = lane_by_lane<Evolution, U>([&](int k) { return Evolution<double>::from(material(k), pass.h); });
+        const Sym3<U> sheared = deviator(D);
+        const U shear_rate = sqrt(U(4.0) * J2(sheared));
+        soil = evolved(soil, evolution, plastic.template load<U>(at), shear_rate, trace(sigma) * U(-1.0 / 3));
+    }
 
     // ---- half-step values: one whole kick. The stress rotates with the material, then the strain loads it.
     const Vec3<U> v_h = fma(kick, a, vh.template load<U>(at));
     const U rho_h = fma(kick, rho_rate, rh.template load<U>(at));
-    const Sym3<U> loading = half * hooke(kick * D, soil); // half before the turn and half after: second order in time
+    const Sym3<U> loading = half * (hooke(kick * D, soil) + kick * diffusion); // half before the turn and half after: second order in time
     const auto mapped = return_to_cone(rotate(spin_increment(L, kick), sh.template load<U>(at) + loading) + loading, soil);
 
     // ---- values at the end of the step: half a step on from there
@@ -416,7 +543,8 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     const Vec3<U> v_end = fma(half_dt, a, v_h);
     const U rho_end = fma(half_dt, rho_rate, rho_h);
     const Sym3<U> s_end =
-        return_to_cone(mapped.sigma + spin(spin_increment(L, half_dt), mapped.sigma) + hooke(half_dt * D, soil), soil).sigma;
+        return_to_cone(mapped.sigma + spin(spin_increment(L, half_dt), mapped.sigma) + hooke(half_dt * D, soil) + half_dt * diffusion, soil)
+            .sigma;
     const U volume_end = U(pass.volume) * rho0 / rho_end;
 
     xx.store(at, x, n);
@@ -450,7 +578,8 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     const U magic(pass.energy_unit * 6755399441055744.0);
     const U volume = U(pass.volume) * rho0 * inverse_rho;
     // viscous power of i's half of its pairs: V_i/2 sum_j V_j rho_i rho_j Pi approach |grad W|/r
-    const U viscous = quantized(half * volume * (-factor) * sum(sums.power) * kick, magic);
+    // and what other terms against noise take: artificial stress -V v.f, stress diffusion -V sigma : C^-1 : D
+    const U viscous = quantized(volume * (half * (-factor) * sum(sums.power) - diffused - stressed) * kick, magic);
     const U worked = quantized(volume * mapped.work, magic);
     const U damped = quantized(volume * rho * mu_d * dot(v, v) * kick, magic);
     const Vec3<U> moved = x - x_sorted.template load<U>(at);
@@ -469,6 +598,7 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     total.acceleration2 = max(select(mine, a2, zero), total.acceleration2);
     total.moved2 = max(select(mine, m2, zero), total.moved2);
     total.speed2 = max(select(mine, v2, zero), total.speed2);
+    total.strained = max(select(mine, max(rho_end / rho0, rho0 / rho_end), zero), total.strained);
     total.signal = max(select(mine, signal, zero), total.signal);
     total.not_finite += select(mine, finite, zero);
     if (pass.low)
@@ -496,9 +626,13 @@ public:
     int cluster_width() const override { return width<V>; }
     scene::Precision precision() const override { return pass::single<V> ? scene::Precision::Mixed : scene::Precision::Double; }
     bool tensile() const override { return Model::tensile; }
-    // r 3, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, shape and volume 8, grad W 3; grad v 18;
-    // stress times grad W 15, sums 6; viscosity: approach 6, pressure 6, on the diagonal 3, power 3
-    double flops_per_pair() const override { return 72 + (Model::viscous ? 18 : 0) + (Model::tensile ? 40 : 0); }
+    // diffusion: q 3, g.r 5, stresses 12, sums 3; correction 12.  Without: r 3, v 3, r.r 5, densities and softening 3, reciprocals 5,
+    // length 1, t 2, shape and volume 8, grad W 3; grad v 18; stress times grad W 15, sums 6; viscosity: approach 6, pressure 6, on the
+    // diagonal 3, power 3
+    double flops_per_pair() const override
+    {
+        return 72 + (Model::viscous ? 18 : 0) + (Model::tensile ? 40 : 0) + (Model::diffusive ? 23 : 0) + (Model::corrected ? 12 : 0);
+    }
     // scaled sums 9, force 27, rates 25, rotation 110, two strain increments 50, two returns to the cone 80, values 70
     double flops_per_particle() const override { return 371; }
     // columns read 23 and written 21, one record read and one written, four bytes a list entry
@@ -552,14 +686,15 @@ private:
             for (int k = 0; k < W; ++k) c[k] = p.records[i.first + std::min(k, i.count - 1)].sound_speed;
             i.c = load<V>(c);
         }
-        pass::Sums<W, Model::tensile> sums;
+        pass::Sums<W, Model> sums;
         double wall_power[W + width<U>] = {};
         // every particle meets itself once in its list
         total.pairs += pass::sum_over_soil(model_, i, p.lists->soil(cluster), p.records, p.tension, p.n_records, sums) - i.count;
         const auto walls = p.lists->walls(cluster);
         if (!walls.empty()) total.pairs += pass::sum_over_walls(model_, i, p, walls, unit_, dimensions_, scale_, sums, wall_power);
         for (int row = 0; row < i.count; row += width<U>)
-            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, place_, total);
+            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, unit_, dimensions_,
+                             place_, total);
     }
 
     double unit_;
@@ -575,6 +710,8 @@ template <class Model, class V> std::string Compiled<Model, V>::name() const
     std::string s = std::is_same_v<K, CubicSpline> ? "cubic spline" : std::is_same_v<K, WendlandC2> ? "wendland c2" : "wendland c4";
     if (Model::viscous) s += " + viscosity";
     if (Model::tensile) s += " + artificial stress";
+    if (Model::diffusive) s += " + stress diffusion";
+    if (Model::corrected) s += " + gradient correction";
     return s + (pass::single<V> ? ", mixed" : ", double") + (width<V> > 1 ? " x " + std::to_string(width<V>) : ", plain");
 }
 

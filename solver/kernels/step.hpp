@@ -4,6 +4,7 @@
 #include "solver/core/particles.hpp"
 #include "solver/kernels/record.hpp"
 #include "solver/neighbours/lists.hpp"
+#include "solver/physics/terms.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/scene.hpp"
 #include <memory>
@@ -23,7 +24,8 @@ template <class T> struct WallRecords {
 };
 
 /// Energy that left the mechanical ledger during a pass, J (J/m in 2-D). Every addend is a multiple of one unit fixed
-/// for the run, so the sums are exact and equal in any order.
+/// for the run, so the sums are exact and equal in any order. Viscous: artificial viscosity and the other terms against
+/// noise, artificial stress and stress diffusion, together.
 struct EnergySums {
     double plastic = 0, viscous = 0, wall = 0, damping = 0;
 };
@@ -36,6 +38,7 @@ struct Extremes {
     double speed2 = 0;        // (m/s)^2
     double bad = 0;           // 1 where a number is not finite
     double outside = 0;       // 1 where a particle left the box
+    double strained = 0;      // density over that at the start, or the other way round
 };
 
 /// What a step of given length does to velocities besides the pair forces.
@@ -61,7 +64,9 @@ template <class T> struct Pass {
     double dt;     // length of this step, s
     double kick;   // half of the step before and half of this one, s
     StepForces forces;
-    double energy_unit; // J
+    const PoreWater* water = nullptr; // still water, if any
+    bool evolving = false;            // a soil's cone changes with strain or its rate
+    double energy_unit;               // J
     std::optional<Vector> low, high;
 };
 
@@ -83,7 +88,8 @@ struct PassResult {
              max(y.moved2, x.moved2),
              max(y.speed2, x.speed2),
              max(y.bad, x.bad),
-             max(y.outside, x.outside)};
+             max(y.outside, x.outside),
+             max(y.strained, x.strained)};
     }
 };
 

@@ -6,11 +6,16 @@
 
 namespace kuzure {
 
-using Variants = std::tuple<Model<CubicSpline, NoViscosity, NoArtificialStress>, Model<CubicSpline, LinearViscosity, NoArtificialStress>,
-                            Model<WendlandC2, LinearViscosity, NoArtificialStress>, Model<CubicSpline, Viscosity, ArtificialStress>,
-                            Model<WendlandC2, Viscosity, ArtificialStress>, Model<WendlandC4, Viscosity, ArtificialStress>>;
+template <class Kernel> using Everything = Model<Kernel, Viscosity, ArtificialStress, StressDiffusion, GradientCorrection>;
 
-inline constexpr int KUZURE_VARIANTS = 6; // read by CMakeLists.txt and Makefile.knl
+using Variants = std::tuple<Model<CubicSpline, NoViscosity>, Model<CubicSpline, LinearViscosity>, Model<WendlandC2, LinearViscosity>,
+                            Model<CubicSpline, Viscosity, ArtificialStress>, Model<WendlandC2, Viscosity, ArtificialStress>,
+                            Model<CubicSpline, LinearViscosity, NoArtificialStress, StressDiffusion>,
+                            Model<WendlandC2, LinearViscosity, NoArtificialStress, StressDiffusion>,
+                            Model<WendlandC2, LinearViscosity, NoArtificialStress, NoStressDiffusion, GradientCorrection>,
+                            Everything<CubicSpline>, Everything<WendlandC2>, Everything<WendlandC4>>;
+
+inline constexpr int KUZURE_VARIANTS = 11; // read by CMakeLists.txt and Makefile.knl
 static_assert(std::tuple_size_v<Variants> == KUZURE_VARIANTS);
 
 } // namespace kuzure

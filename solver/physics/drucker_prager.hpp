@@ -27,6 +27,47 @@ template <class V> struct Elastoplastic {
     }
 };
 
+/// What changes a soil's cone with plastic strain and with the rate of shear, one number or one lane of numbers each.
+template <class V> struct Evolution {
+    V residual_alpha, residual_k;
+    V per_softening, per_dilation; // 1 over the plastic strain of residual strength, and of dilation's end
+    V alpha_psi;
+    V rate_excess, inertial_number, grain, per_grain_density;
+    V cutoff;
+    /// Shear bands are taken to be 2 h wide; h in m.
+    static Evolution from(const Material& m, double h)
+    {
+        using T = number<V>;
+        return {V(T(m.residual_alpha)),    V(T(m.residual_k)),  V(T(2 * h / m.softening_slip)), V(T(1 / m.dilation_decay)),
+                V(T(m.alpha_psi)),         V(T(m.rate_excess)), V(T(m.inertial_number)),        V(T(m.grain)),
+                V(T(1 / m.grain_density)), V(T(m.cutoff))};
+    }
+};
+
+/// The cone of now. Softening (linear in alpha and k) and dilation decay with the plastic shear strain gamma_p:
+///     alpha = alpha_0 + (alpha_r - alpha_0) min(gamma_p/gamma_r, 1),  k alike,  alpha_psi = alpha_psi_0 max(1 - gamma_p/gamma_d, 0)
+/// mu(I) with the rate of shear |D| = sqrt(2 D':D') and the pressure p (Jop et al. 2006):
+///     alpha *= 1 + (mu_2/mu_s - 1)/(1 + I_0/I),  I = |D| d/sqrt(p/rho_grain)
+template <class V>
+KUZURE_INLINE Elastoplastic<V> evolved(const Elastoplastic<V>& soil, const Evolution<V>& e, V plastic_strain, V shear_rate, V pressure)
+{
+    const V one(1), zero(0);
+    const V softened = min(plastic_strain * e.per_softening, one);
+    const V slide = shear_rate * e.grain;
+    const V tiny(number<V>(1e-280)); // the quotient stays finite
+    const V fast = slide / (slide + e.inertial_number * sqrt(max(pressure, zero) * e.per_grain_density) + tiny);
+    Elastoplastic<V> now = soil;
+    now.alpha = fma(softened, e.residual_alpha - soil.alpha, soil.alpha);
+    now.alpha = fma(now.alpha * e.rate_excess, fast, now.alpha);
+    now.k = fma(softened, e.residual_k - soil.k, soil.k);
+    const V alpha_psi = e.alpha_psi * max(one - plastic_strain * e.per_dilation, zero);
+    const V nine_k = V(9) * soil.bulk;
+    now.nine_k_alpha_psi = nine_k * alpha_psi;
+    now.inverse_denominator = one / (soil.shear + nine_k * now.alpha * alpha_psi);
+    now.apex = min(now.k / max(now.alpha, tiny), e.cutoff);
+    return now;
+}
+
 /// sqrt(J2) + alpha I1 - k: positive outside the cone.
 template <class V> V yield_function(Sym3<V> sigma, const Elastoplastic<V>& soil)
 {

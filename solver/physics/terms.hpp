@@ -45,8 +45,8 @@ struct Viscosity {
     {
         const V a = p.approach * p.inverse;
         const V mu = a * p.rho_sum * V(number<V>(h));
-        const V strength = fma(V(number<V>(2 * beta)), mu, V(number<V>(alpha)) * (p.c_i + p.c_j));
-        return (a * p.rho_j) * (p.rho_i * V(number<V>(h)) * strength);
+        const V strength = fma(V(number<V>(2 * beta * h)), mu, V(number<V>(alpha * h)) * (p.c_i + p.c_j));
+        return (a * p.rho_j) * (p.rho_i * strength);
     }
 };
 
@@ -71,6 +71,74 @@ struct ArtificialStress {
         }
     }
 };
+/// Stress diffusion against noise of the spacing's length, Feng et al. (2021), eq. 24:
+///     D_i = 2 zeta h c sum_j V_j psi_ij x_ij . grad W/(r^2 + 0.01 h^2),  psi_ij = sigma_i - sigma_j - static part,
+/// c = sqrt(E/rho). The static part is that of level ground, -rho (g . x_ij) (K0 1 + (1 - K0) g^ g^), g^ = g/|g|, so that a
+/// column at rest is left alone. Neighbours in walls do not count.
+struct StressDiffusion {
+    double zeta;
+    Vector gravity; // m/s^2
+    static StressDiffusion from(const Scene& s)
+    {
+        return {s.effects.stress_diffusion.value_or(scene::StressDiffusion{0}).zeta, s.effects.gravity.value_or(Vector{})};
+    }
+    /// Static stress per unit of -rho g . x_ij: K0 1 + (1 - K0) g^ g^.
+    template <class V> Sym3<V> at_rest(V K0) const
+    {
+        const double g = length(gravity);
+        const Vector n = g > 0 ? (1 / g) * gravity : Vector{};
+        const V one(1), rest = one - K0;
+        using T = number<V>;
+        return {fma(rest, V(T(n.x * n.x)), K0), fma(rest, V(T(n.y * n.y)), K0), fma(rest, V(T(n.z * n.z)), K0),
+                rest * V(T(n.x * n.y)),         rest * V(T(n.y * n.z)),         rest * V(T(n.x * n.z))};
+    }
+};
+
+/// Correction of the velocity gradient, exact for linear velocity fields whatever the neighbours:
+///     grad v <- (grad v) M^-1,  M = sum_j V_j (x_j - x_i) (x) grad W.  Bonet & Lok (1999); Bui & Nguyen (2021).
+/// Where M is too far from a multiple of 1 (a lonely particle, a pair, a thread of them) the plain gradient is kept.
+struct GradientCorrection {
+    static constexpr double least_isotropy = 0.1; // det M over (tr M/dimensions)^dimensions
+    static constexpr double least_trace = 0.1;    // tr M/dimensions
+    /// M^-1 of a symmetric M (3-D, or 2-D in x-z), or 1 where M is too far from isotropic.
+    template <class V> static KUZURE_INLINE Sym3<V> inverse(Sym3<V> m, int dimensions)
+    {
+        using T = number<V>;
+        const V one(1), zero(0), half(T(0.5));
+        if (dimensions == 2) m.yy = half * (m.xx + m.zz);
+        const V third(T(1.0 / 3)), mean = third * trace(m);
+        const V cxx = fnma(m.yz, m.yz, m.yy * m.zz), cyy = fnma(m.xz, m.xz, m.xx * m.zz), czz = fnma(m.xy, m.xy, m.xx * m.yy);
+        const V cxy = fnma(m.xy, m.zz, m.xz * m.yz), cyz = fnma(m.xx, m.yz, m.xy * m.xz), cxz = fnma(m.xz, m.yy, m.xy * m.yz);
+        const V det = fma(m.xx, cxx, fma(m.xy, cxy, m.xz * cxz));
+        const auto good = [&](V a) {
+            return select(less(V(T(least_isotropy)) * mean * mean * mean, det), select(less(V(T(least_trace)), mean), a, zero), zero);
+        };
+        const V use = good(one), keep = one - use;
+        const V per_det = use / fma(det, use, keep);
+        return {fma(cxx, per_det, keep), fma(cyy, per_det, keep), fma(czz, per_det, keep), cxy * per_det, cyz * per_det, cxz * per_det};
+    }
+};
+
+/// Still pore water: p_w = rho_w g (z_w(x) - z) below the table, whose gradient drives the skeleton (buoyancy, seepage):
+///     rho dv/dt = div sigma' - grad p_w + rho g.  Bui et al. (2011), with the gradient of the given table itself.
+struct PoreWater {
+    std::vector<std::array<double, 2>> table; // x, z in m
+    double unit_weight = 0;                   // N/m^3
+    static PoreWater from(const Scene& s)
+    {
+        const auto& p = s.effects.pore_pressure;
+        if (!p) return {};
+        return {p->table, p->density * length(s.effects.gravity.value_or(Vector{}))};
+    }
+    bool present() const { return !table.empty(); }
+    /// Pressure (Pa) and its gradient (Pa/m) at a point.
+    struct Pressure {
+        double value = 0;
+        Vector gradient{};
+    };
+    Pressure at(Vector x) const;
+};
+
 /// tau of one particle: zero unless a principal stress is tensile.
 Stress tension(const Stress& sigma, double epsilon);
 

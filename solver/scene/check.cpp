@@ -52,6 +52,16 @@ std::string why_no_tension(const Scene& scene)
     return fmt::format("{} and phi < {:.1f} deg: no tensile principal stress can exist", strength, degrees(least));
 }
 
+/// Why the static part that stress diffusion takes out is not that of this scene, or empty.
+std::string no_static_part(const Scene& scene)
+{
+    const auto& g = scene.effects.gravity;
+    if (g && (g->x != 0 || g->y != 0)) return "gravity is not vertical, so the ground is not level";
+    if (scene.soils.size() > 1) return "there are several soils, between which stress jumps";
+    if (scene.effects.pore_pressure) return "effective stress under water does not grow with the soil's own weight";
+    return {};
+}
+
 template <class... Args> std::string text(fmt::format_string<Args...> pattern, Args&&... args)
 {
     return fmt::format(pattern, std::forward<Args>(args)...);
@@ -91,6 +101,21 @@ void check_soils(const Scene& scene, Rules& rules)
                                                       "Pa, found {:.6g} Pa; lower it or leave "
                                                       "it out",
                                                       m.k / m.alpha / 3, *soil.tension_cutoff));
+        if (soil.dilation_decay && soil.dilation_angle == 0)
+            rules.warning(key + ".dilation_decay", "it changes nothing: dilation_angle is 0");
+        if (const auto& s = soil.softening; s && (s->cohesion > soil.cohesion || s->friction_angle > soil.friction_angle))
+            rules.error(key + ".softening", text("expected a residual strength of at most the first, found {:.6g} Pa and {:.6g} deg "
+                                                 "against {:.6g} Pa and {:.6g} deg; lower it",
+                                                 s->cohesion, degrees(s->friction_angle), soil.cohesion, degrees(soil.friction_angle)));
+        if (const auto& r = soil.rate_friction) {
+            if (soil.friction_angle == 0)
+                rules.error(key + ".rate_friction", "expected a soil with a friction_angle above 0, which this law raises; give one");
+            else if (r->friction_angle < soil.friction_angle)
+                rules.error(key + ".rate_friction.friction_angle",
+                            text("expected at least the friction angle at rest, found {:.6g} deg < {:.6g} deg; friction that falls with "
+                                 "the rate of shear is unstable",
+                                 degrees(r->friction_angle), degrees(soil.friction_angle)));
+        }
         if (m.alpha == 0 && !soil.tension_cutoff)
             rules.warning(key, "without friction the cone has no apex, so the soil bears any mean tension; give a "
                                "tension_cutoff if it should not");
@@ -212,6 +237,20 @@ void check_effects(const Scene& scene, Rules& rules)
     const Effects& effects = scene.effects;
     if (scene.dimensions == 2 && effects.gravity && effects.gravity->y != 0)
         rules.error("effects.gravity", text("expected no gravity along y in 2-D, found {}; set it to 0", effects.gravity->y));
+    if (const auto& water = effects.pore_pressure) {
+        const auto& g = effects.gravity;
+        if (!g || !(g->z < 0) || g->x != 0 || g->y != 0)
+            rules.error("effects.pore_pressure", "expected gravity along -z with still water; let effects.gravity be [0, 0, -9.81]");
+        if (water->table.empty())
+            rules.error("effects.pore_pressure.table", "expected at least one corner [x, z], found none; one is a level table");
+        for (std::size_t k = 1; k < water->table.size(); ++k)
+            if (!(water->table[k - 1][0] < water->table[k][0]))
+                rules.error("effects.pore_pressure.table", text("expected corners with increasing x, found {} after {}; reorder them",
+                                                                water->table[k][0], water->table[k - 1][0]));
+    }
+    if (effects.stress_diffusion && effects.stress_diffusion_decision == Decision::AsWritten)
+        if (const auto doubt = no_static_part(scene); !doubt.empty())
+            rules.warning("effects.stress_diffusion", "it smooths what should not be smooth: " + doubt);
     if (effects.damping && effects.damping->until > scene.time.end)
         rules.warning("effects.damping.until",
                       text("damping lasts beyond the end of the run ({} s > {} s)", effects.damping->until, scene.time.end));
@@ -314,6 +353,29 @@ void resolve(Scene& scene)
                   automatic ? tension + ", so tensile instability is possible" : "as written in the scene"));
     else note("artificial_stress", false, automatic ? why_no_tension(scene) : unwritten);
 
+    const bool smoothing = effects.stress_diffusion_decision == Decision::Auto;
+    const std::string doubt = no_static_part(scene);
+    if (smoothing) {
+        effects.stress_diffusion.reset();
+        if (doubt.empty()) effects.stress_diffusion = StressDiffusion{};
+    }
+    if (const auto& d = effects.stress_diffusion)
+        note("stress_diffusion", true,
+             text("zeta = {:.6g}: {}", d->zeta,
+                  smoothing ? "one soil on level ground, noise of the spacing's length can be told from stress"
+                            : "as written in the scene"));
+    else note("stress_diffusion", false, smoothing ? doubt : unwritten);
+
+    if (const auto& w = effects.pore_pressure)
+        note("pore_pressure", true,
+             text("still water of {:.6g} kg/m^3 below a table of {} corners; stresses are effective", w->density, w->table.size()));
+    else note("pore_pressure", false, unwritten);
+
+    note("gradient_correction", scene.accuracy.correction == Correction::Gradient,
+         scene.accuracy.correction == Correction::Gradient
+             ? "velocity gradients exact for linear fields; stress power no longer that of the pair forces"
+             : "accuracy.correction = \"none\"");
+
     if (const auto& d = effects.damping) note("damping", true, text("{:.6g} of critical until t = {:.6g} s", d->ratio, d->until));
     else note("damping", false, unwritten);
 
@@ -327,6 +389,14 @@ void resolve(Scene& scene)
     note("dilation", !dilating.empty(), dilating.empty() ? "psi = 0: plastic flow keeps the volume" : "psi > 0 in " + dilating);
     const auto cut = list_soils([](const Soil& s) { return s.tension_cutoff.has_value(); });
     note("tension_cutoff", !cut.empty(), cut.empty() ? "mean tension is limited by the cone's apex only" : "written for " + cut);
+
+    const auto decaying = list_soils([](const Soil& s) { return s.dilation_decay.has_value() && s.dilation_angle > 0; });
+    note("dilation_decay", !decaying.empty(), decaying.empty() ? unwritten : "dilation dies out in " + decaying);
+    const auto weak = list_soils([](const Soil& s) { return s.softening.has_value(); });
+    note("softening", !weak.empty(),
+         weak.empty() ? unwritten : text("{}: residual strength after a slip, bands taken {:.4g} m wide", weak, scene.support()));
+    const auto fast = list_soils([](const Soil& s) { return s.rate_friction.has_value(); });
+    note("rate_friction", !fast.empty(), fast.empty() ? unwritten : "mu(I) in " + fast);
 
     const auto resting =
         std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.stress == InitialStress::AtRest; });
@@ -363,12 +433,6 @@ Issues check(const Scene& scene, StepLimit limit)
     check_effects(scene, rules);
     check_time(scene, limit, rules);
     check_inside(scene, rules);
-    for (std::size_t w = 0; w < scene.walls.size(); ++w)
-        if (scene.walls[w].surface == Surface::Coulomb)
-            rules.warning(
-                "wall." + std::to_string(w) + ".surface",
-                "the friction of this surface is not verified yet: a sliding block kept 0.68 of its speed where Coulomb's law leaves 0.29 "
-                "(tests/mpi/physics_test.cpp); rough and smooth surfaces are");
     // Filling asks for shapes that make sense.
     if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
         for (auto& issue : Filling::problems(scene)) rules.issues.push_back(std::move(issue));

@@ -15,6 +15,19 @@ struct Material {
     double alpha, k;    // 1, Pa
     double alpha_psi;   // 1, slope of the plastic potential sqrt(J2) + alpha_psi I1
     double apex;        // Pa, largest trace I1: k/alpha or 3 p_t of the cut-off; infinite without friction and cut-off
+    double cutoff;      // Pa, 3 p_t; infinite without
+    double rod_speed;   // sqrt(E/rho), m/s
+    double at_rest;     // horizontal over vertical stress of level ground without cohesion: nu/(1 - nu), or where that lies
+                        // outside the cone, the ratio on it
+    // What changes the cone during a run; where it does not, the residual values are the first ones.
+    double residual_alpha, residual_k;
+    double softening_slip = std::numeric_limits<double>::infinity(); // m
+    double dilation_decay = std::numeric_limits<double>::infinity(); // 1
+    double rate_excess = 0;                                          // tan(phi_2)/tan(phi) - 1
+    double inertial_number = 1, grain = 0, grain_density = 1;        // I_0, m, kg/m^3
+
+    /// True if cone or dilation change with strain or its rate.
+    bool evolves() const { return std::isfinite(softening_slip) || std::isfinite(dilation_decay) || grain > 0; }
 
     /// Slope alpha of the cone through a friction (or dilation) angle in rad.
     static double slope(scene::Cone cone, double angle)
@@ -60,7 +73,23 @@ struct Material {
         m.k = strength(soil.cone, soil.friction_angle, soil.cohesion);
         m.alpha_psi = slope(soil.cone, soil.dilation_angle);
         m.apex = m.alpha > 0 ? m.k / m.alpha : std::numeric_limits<double>::infinity();
-        if (soil.tension_cutoff) m.apex = std::min(m.apex, 3 * *soil.tension_cutoff);
+        m.cutoff = soil.tension_cutoff ? 3 * *soil.tension_cutoff : std::numeric_limits<double>::infinity();
+        m.apex = std::min(m.apex, m.cutoff);
+        m.rod_speed = std::sqrt(soil.young / m.density);
+        // (1 - K)/sqrt3 = alpha (1 + 2 K) on the cone
+        const double root3 = std::sqrt(3.0);
+        m.at_rest = std::max(soil.poisson / (1 - soil.poisson), (1 - root3 * m.alpha) / (1 + 2 * root3 * m.alpha));
+        m.residual_alpha = m.alpha, m.residual_k = m.k;
+        if (const auto& s = soil.softening) {
+            m.residual_alpha = slope(soil.cone, s->friction_angle);
+            m.residual_k = strength(soil.cone, s->friction_angle, s->cohesion);
+            m.softening_slip = s->slip;
+        }
+        if (soil.dilation_decay) m.dilation_decay = *soil.dilation_decay;
+        if (const auto& r = soil.rate_friction) {
+            m.rate_excess = std::tan(r->friction_angle) / std::tan(soil.friction_angle) - 1;
+            m.inertial_number = r->inertial_number, m.grain = r->grain, m.grain_density = r->grain_density;
+        }
         return m;
     }
     /// Largest alpha for which a soil without cohesion bears no tensile principal stress: 1/(2 sqrt 3),

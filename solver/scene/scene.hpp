@@ -37,6 +37,22 @@ using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
 // ---- matter ----
 enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation };
 
+/// Loss of strength with plastic shear. The slip is that across a whole shear band, so the dissipated energy does not
+/// depend on the resolution: bands are taken to be one support, 2 h, wide (Bazant & Oh 1983).
+struct Softening {
+    double cohesion = 0, friction_angle = 0; // residual, Pa and rad
+    double slip;                             // m, at which the residual strength is reached
+    bool operator==(const Softening&) const = default;
+};
+/// Friction that grows with the rate of shear, mu(I) = mu_s + (mu_2 - mu_s)/(1 + I_0/I). Jop, Forterre & Pouliquen (2006).
+struct RateFriction {
+    double friction_angle;  // rad, of fast flow: mu_2 = tan
+    double inertial_number; // I_0
+    double grain;           // m, diameter
+    double grain_density;   // kg/m^3
+    bool operator==(const RateFriction&) const = default;
+};
+
 struct Soil {
     std::string name;
     double density;            // kg/m^3
@@ -47,6 +63,9 @@ struct Soil {
     double dilation_angle = 0; // rad
     Cone cone = Cone::Compression;
     std::optional<double> tension_cutoff; // Pa, largest mean tension; at most the apex c cot(phi)
+    std::optional<double> dilation_decay; // plastic shear strain at which dilation has died out
+    std::optional<Softening> softening;
+    std::optional<RateFriction> rate_friction;
     bool operator==(const Soil&) const = default;
 };
 
@@ -76,6 +95,17 @@ struct ArtificialStress {
     double epsilon = 0.5, exponent = 2.55;
     bool operator==(const ArtificialStress&) const = default;
 };
+/// Stress diffusion against noise of the spacing's length. Feng et al. (2021).
+struct StressDiffusion {
+    double zeta = 0.1;
+    bool operator==(const StressDiffusion&) const = default;
+};
+/// Pore water that does not flow: hydrostatic below a water table given by its corners, level beyond the first and last.
+struct PorePressure {
+    std::vector<std::array<double, 2>> table; // x, z in m, x increasing
+    double density = 1000;                    // kg/m^3
+    bool operator==(const PorePressure&) const = default;
+};
 struct Damping {
     double ratio; // of critical, 1
     double until; // s
@@ -88,6 +118,9 @@ struct Effects {
     std::optional<Viscosity> viscosity;
     std::optional<ArtificialStress> artificial_stress;
     Decision artificial_stress_decision = Decision::AsWritten;
+    std::optional<StressDiffusion> stress_diffusion;
+    Decision stress_diffusion_decision = Decision::AsWritten;
+    std::optional<PorePressure> pore_pressure;
     std::optional<Damping> damping;
     bool operator==(const Effects&) const = default;
 };
@@ -101,7 +134,7 @@ struct EffectNote {
 // ---- accuracy, output ----
 enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
 enum class Precision { Double, Mixed };
-enum class Correction { None };
+enum class Correction { None, Gradient };
 
 struct Accuracy {
     Kernel kernel = Kernel::CubicSpline;
