@@ -19,13 +19,15 @@ public:
     Stress operator()(Vector x, int soil) const
     {
         const double dx = scene_.space.spacing, half = 0.499999 * dx, top = filling_.soil_bounds().high.z;
-        double load = 0; // Pa
+        double load = 0, surface = x.z; // Pa, m
         filling_.for_each_soil_in({{x.x - half, x.y - half, x.z - half}, {x.x + half, x.y + half, top + half}},
                                   [&](std::int64_t, Vector above, int body) {
                                       const double part = above.z < x.z + 0.25 * dx ? 0.5 : 1.0;
+                                      surface = std::max(surface, above.z + 0.5 * dx);
                                       load += part * soils_[scene_.bodies[body].soil].density * gravity_ * dx;
                                   });
-        load -= water_.at(x).value; // what the water carries is not the skeleton's
+        // What the pore water carries is not the skeleton's; water standing above the soil weighs on both.
+        load -= water_.at(x).value - water_.at({x.x, x.y, surface}).value;
         if (load <= 0) return {};
         const Material& m = soils_[soil];
         // K0 from K and G: nu/(1 - nu) = (3 K - 2 G)/(3 K + 4 G)

@@ -62,16 +62,35 @@ skin = 0.05
 history = 0.001
 every = 0.01
 """
+EVERY_EFFECT = {
+    "friction_angle = 25.0": """dilation_angle = 5.0
+dilation_decay = 0.05
+tension_cutoff = 2000.0
+softening = { cohesion = 1000.0, friction_angle = 20.0, slip = 0.01 }
+rate_friction = { friction_angle = 33.0, grain = 0.001 }""",
+    "high = [1.6, 0.24, 0.0] }": "surface = { friction_angle = 20.0 }",
+    "[effects]": """stress_diffusion = { zeta = 0.1 }
+pore_pressure = { table = [[0.0, 0.3], [1.0, 0.1]] }
+damping = { ratio = 0.02, until = 0.01 }""",
+    "[accuracy]": 'correction = "gradient"',
+}
 try:
     for name, numbers in {
         "dry, double": dict(cohesion=0.0, beta=0.0, precision="double"),
         "cohesive, double": dict(cohesion=3000.0, beta=0.5, precision="double"),
         "dry, mixed": dict(cohesion=0.0, beta=0.0, precision="mixed"),
+        "every effect, double": dict(cohesion=3000.0, beta=0.5, precision="double"),
+        "every effect, mixed": dict(cohesion=3000.0, beta=0.5, precision="mixed"),
     }.items():
-        tag = name.replace(", ", "-")
+        tag = name.replace(", ", "-").replace(" ", "-")
         scene = os.path.join(work, tag + ".toml")
         with open(scene, "w") as f:
-            f.write(FAST.format(**numbers))
+            text = FAST.format(**numbers)
+            if name.startswith("every"):
+                for key, more in EVERY_EFFECT.items():
+                    assert key in text
+                    text = text.replace(key, key + "\n" + more)
+            f.write(text)
         one = run(scene, tag + "-1x1")
         check(one["rebuilds"] > 5, f"{name}: {one['rebuilds']} rebuilds")
         for ranks, threads in ((1, 2), (2, 1), (4, 1), (7, 1)):
