@@ -1,6 +1,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/core/field.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/numbers.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
 #include <numbers>
@@ -436,6 +437,9 @@ Issues check(const Scene& scene, StepLimit limit)
     // Filling asks for shapes that make sense.
     if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
         for (auto& issue : Filling::problems(scene)) rules.issues.push_back(std::move(issue));
+    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
+        for (auto& judgement : judge(scene, Filling(scene)))
+            if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
     return rules.issues;
 }
 

@@ -163,7 +163,11 @@ TEST(SceneFile, EveryJobIsReadWithoutAWarning)
     for (const auto& entry : fs::directory_iterator(source / "jobs/scenes"))
         if (entry.path().extension() == ".toml") {
             const auto scene = io::read_scene(entry.path());
-            for (const auto& issue : scene::check(scene)) ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
+            // The paper's larger cubes are as soft as its small one: that they are warned of is right.
+            const bool large = entry.path().stem() == "hirata_104" || entry.path().stem() == "hirata_208";
+            for (const auto& issue : scene::check(scene))
+                if (!large || (issue.key != "base_strain" && issue.key != "mach"))
+                    ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
         }
 }
 

@@ -7,6 +7,7 @@
 #include "solver/app/simulation.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -99,7 +100,10 @@ void add_check(CLI::App& app, Action& chosen)
             for (const auto& issue : scene::check(s, args->force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
                 warnings.push_back(issue.key + ": " + issue.text);
             if (comm.rank() != 0) return Exit::Ok;
+            const auto judgements = scene::judge(s, filling);
             if (*json) {
+                auto numbers = nlohmann::ordered_json::object();
+                for (const auto& n : judgements) numbers[n.name] = n.value;
                 nlohmann::ordered_json j{{"soil_particles", e.soil},
                                          {"wall_particles", e.walls},
                                          {"dt", e.dt},
@@ -108,6 +112,7 @@ void add_check(CLI::App& app, Action& chosen)
                                          {"disk_bytes", std::int64_t(e.disk)},
                                          {"predicted_seconds", e.seconds},
                                          {"effects", io::effects_json(s.notes)},
+                                         {"numbers", numbers},
                                          {"warnings", warnings}};
                 fmt::print("{}\n", j.dump(2));
                 return Exit::Ok;
@@ -120,6 +125,8 @@ void add_check(CLI::App& app, Action& chosen)
             fmt::print("  memory      {} in all, disk {}\n", bytes_text(e.memory), bytes_text(e.disk));
             fmt::print("  time        about {:.1f} minutes on this machine\n\n", e.seconds / 60);
             for (const auto& n : s.notes) fmt::print("  {:<4}{}: {}\n", n.on ? "on" : "off", n.name, n.why);
+            fmt::print("\n");
+            for (const auto& n : judgements) fmt::print("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);
             for (const auto& w : warnings) fmt::print("\n  warning: {}\n", w);
             fmt::print("\n{}", io::write_scene(s));
             return Exit::Ok;
