@@ -309,6 +309,8 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
         return wrong_number(key, node);
     case Kind::Integer:
         return node.is_integer() ? wrong_number(key, node) : unless(false);
+    case Kind::Flag:
+        return unless(node.is_boolean());
     case Kind::Vector:
         return wrong_numbers(key, node, 3);
     case Kind::Pair:
@@ -445,6 +447,7 @@ template <class A> void describe(A& a, Scene& s)
     a.section("time");
     a.number("time.end", s.time.end);
     a.number("time.step", s.time.step);
+    a.flag("time.retry", s.time.retry);
 
     a.soils(s.soils, [&](const std::string& path, scene::Soil& soil) {
         a.number(path + ".density", soil.density);
@@ -531,6 +534,7 @@ public:
         if (file_.find(path)) text(path, to);
     }
     void integer(const std::string& path, int& to) { to = int(node(path).as_integer()->get()); }
+    void flag(const std::string& path, bool& to) { to = node(path).as_boolean()->get(); }
     void number(const std::string& path, double& to) { to = number_of(node(path)); }
     void number(const std::string& path, std::optional<double>& to)
     {
@@ -688,6 +692,10 @@ public:
     void text(const std::string& path, const std::string& s) { emit(path, toml_string(s)); }
     void optional_text(const std::string& path, const std::string& s) { s.empty() ? absent(path) : text(path, s); }
     void integer(const std::string& path, int n) { emit(path, std::to_string(n)); }
+    void flag(const std::string& path, bool on)
+    {
+        if (on || purpose_ == Purpose::File) emit(path, on ? "true" : "false");
+    }
     void number(const std::string& path, double x) { emit(path, digits(x)); }
     void number(const std::string& path, const std::optional<double>& x) { x ? number(path, *x) : absent(path); }
     void angle(const std::string& path, double x) { emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x)); }
@@ -889,7 +897,8 @@ std::string scene_reference()
         std::string name = key.path.substr(here.empty() ? 0 : here.size() + 1);
         if (name.starts_with("*.")) name.erase(0, 2);
         const std::string shown = key.need == Need::Required ? "needed" : key.need == Need::Optional ? "none" : "`" + key.fallback + "`";
-        const char* names[] = {"string", "number", "integer", "[x, y, z]", "[from, to]", "[[x, z], ...]", "", "", "", "table", "", ""};
+        const char* names[] = {"string", "number", "integer", "true or false", "[x, y, z]", "[from, to]", "[[x, z], ...]", "", "", "",
+                               "table",  "",       ""};
         std::string value = names[int(key.kind)];
         if (!key.choices.empty()) {
             value = fmt::format("`\"{}\"`", fmt::join(key.choices, "\"`, `\""));

@@ -36,6 +36,16 @@ std::vector<Key> make_keys()
         {"time.end", Number, "s", Required, "", above(0), {}, "1.0", "time at which the run ends", book},
         {"time.step", Number, "s", Optional, "", above(0), {}, "1.0e-4", "fixed step; without it the step follows accuracy.cfl"},
 
+        {"time.retry",
+         Flag,
+         "",
+         Default,
+         "false",
+         any,
+         {},
+         "true",
+         "when numbers fail: back to the last good state in memory and on with half the step, once for each trouble"},
+
         {"soil", Named, "", Required, "", any, {}, "[soil.sand]", "any number of soils, each with a name"},
         {"soil.*", Table, "", Optional, "", any, {}, "[soil.sand]", "one soil"},
         {"soil.*.density", Number, "kg/m^3", Required, "", above(0), {}, "1850.0", "bulk density at the start"},
@@ -404,6 +414,8 @@ std::string Key::expected() const
         return "a number" + of_unit + limits;
     case Kind::Integer:
         return "an integer" + limits;
+    case Kind::Flag:
+        return "true or false";
     case Kind::Vector:
         return "three numbers [x, y, z]" + of_unit;
     case Kind::Pair:

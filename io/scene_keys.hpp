@@ -12,6 +12,7 @@ enum class Kind {
     Text,
     Number,
     Integer,
+    Flag,          // true or false
     Vector,        // [x, y, z]
     Pair,          // [from, to]
     Points,        // [[x, z], ...]

@@ -1,5 +1,7 @@
 #include "solver/app/simulation.hpp"
+#include "solver/app/guard.hpp"
 #include "solver/app/initial_stress.hpp"
+#include "solver/scene/check.hpp"
 #include <fmt/format.h>
 #include <limits>
 #include <map>
@@ -216,17 +218,18 @@ void Simulation::fill()
 double Simulation::next_dt() const
 {
     const double end = scene_.time.end;
-    if (scene_.time.step) return clock_.step < std::llround(end / *scene_.time.step) ? *scene_.time.step : 0;
+    if (scene_.time.step) {
+        const double dt = clock_.step_scale * *scene_.time.step;
+        return clock_.step - clock_.base_step < std::llround((end - clock_.base_time) / dt) ? dt : 0;
+    }
     if (clock_.time >= end) return 0;
     // dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|) )
     const double h = scene_.smoothing_length(), a = std::sqrt(clock_.extremes.acceleration2);
     const double limit = std::min(h / clock_.extremes.signal, a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity());
-    const double dt = scene_.accuracy.cfl * limit;
+    const double dt = clock_.step_scale * scene_.accuracy.cfl * limit;
     // The last step is shortened to end on time; a remainder of round-off is not a step.
     return clock_.time + dt * (1 + 1e-9) >= end ? end - clock_.time : dt;
 }
-
-bool Simulation::outran() const { return std::sqrt(clock_.extremes.speed2) * clock_.dt > scene_.smoothing_length(); }
 
 bool Simulation::outgrown() const { return !built_ || 2 * std::sqrt(clock_.extremes.moved2) > skin_ * (1 - 1e-6); }
 
@@ -234,7 +237,10 @@ Wishes Simulation::step(Wishes mine)
 {
     const double dt = next_dt();
     ensure(dt > 0, "a finished run was asked for another step");
-    if (outgrown()) rebuild(true);
+    if (outgrown()) {
+        rebuild(true);
+        inspect();
+    }
     forces_.damping = 0;
     if (const auto& d = scene_.effects.damping; d && clock_.time < d->until) {
         // mu_d = ratio * 2 omega_1, omega_1 = pi c_p/(2 H): critical for the lowest mode of a column of height H
@@ -307,7 +313,7 @@ Wishes Simulation::step(Wishes mine)
     my_particle_steps_ += particles_.size();
     clock_.dissipated.add(result.energy, clock_.energy_unit);
     clock_.step += 1;
-    clock_.time = scene_.time.step                                   ? double(clock_.step) * *scene_.time.step
+    clock_.time = scene_.time.step                                   ? clock_.base_time + double(clock_.step - clock_.base_step) * dt
                   : clock_.time + dt * (1 + 1e-9) >= scene_.time.end ? scene_.time.end
                                                                      : clock_.time + dt;
     clock_.dt = dt;
@@ -319,7 +325,7 @@ Wishes Simulation::step(Wishes mine)
         clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5], all[6]};
         mine = {all[7] != 0, all[8] != 0};
     });
-    if (clock_.extremes.bad != 0 || clock_.extremes.outside != 0 || outran()) report_failure();
+    judge_step();
     return mine;
 }
 
@@ -330,47 +336,131 @@ void Simulation::count_work(Phase phase, std::int64_t pairs, std::size_t cluster
                 particles * model_->bytes_per_particle());
 }
 
-void Simulation::report_failure()
+std::int64_t Simulation::fastest() const
 {
+    const auto& p = particles_;
+    double v2 = -1;
+    std::int64_t id = std::numeric_limits<std::int64_t>::max();
+    for (Index i = 0; i < p.size(); ++i) {
+        const Vector v = p[field::velocity][i];
+        const double here = dot(v, v);
+        if (here > v2 || (here == v2 && p[field::id][i] < id)) v2 = here, id = p[field::id][i];
+    }
+    if (v2 < comm_.max(v2)) id = std::numeric_limits<std::int64_t>::max();
+    comm_.min(std::span(&id, 1));
+    return id;
+}
+
+std::pair<std::string, std::string> Simulation::diagnosis() const
+{
+    const double h = scene_.smoothing_length(), courant = clock_.dt / scene::crossing_time(scene_);
+    const double a = std::sqrt(clock_.extremes.acceleration2), free = a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity();
+    const bool tension = std::any_of(soils_.begin(), soils_.end(), [](const Material& m) { return m.k > 0; });
+    if (courant > scene::recommended_courant)
+        return {fmt::format("the time step is too long for the P-wave: dt c_p/h = {:.3g}, recommended up to {}", courant,
+                            scene::recommended_courant),
+                fmt::format("a time.step of {:.3g} s or less, or none (accuracy.cfl then sets it)", scene::recommended_step(scene_))};
+    if (clock_.dt > scene::recommended_courant * free)
+        return {fmt::format("the time step is too long for the acceleration: dt = {:.3g} s, sqrt(h/|a|) = {:.3g} s", clock_.dt, free),
+                "a smaller time.step, or none (accuracy.cfl then sets it)"};
+    if (!scene_.effects.viscosity)
+        return {"there is no artificial viscosity to damp shocks and zero-energy modes", "effects.viscosity = { alpha = 0.1 }"};
+    if (tension && !scene_.effects.artificial_stress)
+        return {"cohesive soil under tension clumps without artificial stress", "effects.artificial_stress = \"auto\""};
+    return {fmt::format("an outlier velocity, although dt c_p/h = {:.3g}", courant),
+            "a smaller time.step or accuracy.cfl, more viscosity, or time.retry = true"};
+}
+
+void Simulation::blame(std::int64_t id, const std::string& what, const std::string& remedy)
+{
+    const auto& p = particles_;
+    std::string text;
+    int root = 0;
+    for (Index i = 0; i < p.size(); ++i) {
+        if (p[field::id][i] != id) continue;
+        const Vector x = p[field::position][i], v = p[field::velocity][i];
+        text = fmt::format("particle {} (body {}) {} at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. Remedy: {}",
+                           id, filling_.body_of(id), what, x.x, x.y, x.z, length(v), clock_.step, clock_.time, remedy);
+        root = comm_.rank();
+    }
+    root = int(comm_.max(std::int64_t(root)));
+    throw NumbersFailed(comm_.broadcast(text, root));
+}
+
+void Simulation::judge_step()
+{
+    const Extremes& e = clock_.extremes;
+    const double h = scene_.smoothing_length();
+    const bool outran = std::sqrt(e.speed2) * clock_.dt > h;
+    if (e.bad == 0 && e.outside == 0 && !outran && e.strained < limit::density) return;
     // The lowest id among the offenders, so that the message does not depend on the ranks.
     const auto& p = particles_;
-    std::int64_t mine = std::numeric_limits<std::int64_t>::max();
-    Index where = -1;
+    std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
     const auto finite = [](Vector a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); };
     for (Index i = 0; i < p.size(); ++i) {
         const Vector x = p[field::position][i];
-        bool failed = !finite(x) || !finite(p[field::velocity][i]) || !std::isfinite(trace(p[field::stress][i])) ||
-                      !std::isfinite(p[field::density][i]) || length(p[field::velocity][i]) * clock_.dt > scene_.smoothing_length();
+        const double ratio = p[field::density][i] / soils_[p[field::soil][i]].density;
+        bool failed = !finite(x) || !finite(p[field::velocity][i]) || !std::isfinite(trace(p[field::stress][i])) || !std::isfinite(ratio) ||
+                      length(p[field::velocity][i]) * clock_.dt > h || ratio >= limit::density || ratio * limit::density <= 1;
         if (scene_.space.low) {
             const Vector lo = *scene_.space.low, hi = *scene_.space.high;
             const auto out = [&](int axis, double v, double a, double b) { return !scene_.space.periodic[axis] && (v < a || v > b); };
             failed = failed || out(0, x.x, lo.x, hi.x) || (scene_.dimensions == 3 && out(1, x.y, lo.y, hi.y)) || out(2, x.z, lo.z, hi.z);
         }
-        if (failed && p[field::id][i] < mine) mine = p[field::id][i], where = i;
+        if (failed) lowest = std::min(lowest, std::int64_t(p[field::id][i]));
     }
-    std::int64_t lowest = mine;
     comm_.min(std::span(&lowest, 1));
-    std::string text;
-    int root = 0;
-    if (where >= 0 && mine == lowest) {
-        const Vector x = p[field::position][where], v = p[field::velocity][where];
-        const double crossing = scene_.smoothing_length() / soils_[p[field::soil][where]].sound_speed;
-        const std::string who = fmt::format("particle {} (body {})", mine, filling_.body_of(mine));
-        const std::string there = fmt::format("at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s", x.x, x.y, x.z,
-                                              length(v), clock_.step, clock_.time);
-        if (clock_.extremes.bad == 0 && !outran())
-            text = fmt::format("{} left the box {}. Remedy: a larger space.low/space.high, a longer wall, or a smaller step", who, there);
-        else
-            text = fmt::format("{} {} {}: the time step is too long (dt = {:.3g} s, h/c_p = {:.3g} s). Remedy: a smaller time.step or "
-                               "accuracy.cfl, or more viscosity",
-                               who,
-                               clock_.extremes.bad == 0 ? "went further than its smoothing length in one step,"
-                                                        : "has numbers that are no longer finite,",
-                               there, clock_.dt, crossing);
-        root = comm_.rank();
-    }
-    root = int(comm_.max(std::int64_t(root)));
-    throw NumbersFailed(comm_.broadcast(text, root));
+    const auto [why, remedy] = diagnosis();
+    if (e.bad != 0) blame(lowest, "has numbers that are no longer finite (" + why + ")", remedy);
+    if (outran) blame(lowest, "went further than its smoothing length in one step (" + why + ")", remedy);
+    if (e.outside != 0) blame(lowest, "left the box", "a larger space.low/space.high, a longer wall, or a smaller step");
+    blame(lowest, fmt::format("changed its density {} fold (", limit::density) + why + ")", remedy);
+}
+
+void Simulation::inspect()
+{
+    const auto remember = [&] {
+        if (scene_.time.retry) good_ = Good{particles_, clock_, my_pairs_, my_particle_steps_};
+    };
+    if (!good_) remember(); // the start of the run, or of its restart
+    if (clock_.step - clock_.inspected < 64) return;
+    timers_.timed(Phase::Guard, [&] {
+        clock_.inspected = clock_.step;
+        const Ledger l = ledger();
+        // Against a thousandth of weight times height at least, so that the first movement is not judged by itself.
+        const double yard = std::exp2(58) * clock_.energy_unit;
+        const double scale =
+            std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start), 1e-3 * yard});
+        const double grown = (l.sum() - clock_.energy_at_start) / scale;
+        const auto [why, remedy] = diagnosis();
+        if (!(grown < limit::energy_growth))
+            blame(fastest(), fmt::format("is the fastest while energy grows out of nothing, by {:.0f} % ({})", 100 * grown, why), remedy);
+        const auto seen =
+            inspect_neighbours(comm_, scene_, filling_.soil_count(), particles_, lists_, ghost_x_.data(), ghost_y_.data(), ghost_z_.data());
+        structure_.clumped = seen.clumped, structure_.most_clumped = std::max(structure_.most_clumped, seen.clumped);
+        structure_.deepest = std::max(structure_.deepest, seen.deepest);
+        if (seen.most_neighbours > limit::neighbours)
+            blame(seen.crowded_id,
+                  fmt::format("has {:.1f} times the neighbours of the lattice: soil has clumped ({})", seen.most_neighbours, why), remedy);
+        if (seen.deepest > limit::penetration)
+            blame(seen.sunk_id, fmt::format("has sunk {:.1f} spacings into a wall", seen.deepest),
+                  "a thicker wall (2 h), a smaller step, or viscosity with beta = 1 for fast impacts");
+        remember();
+    });
+}
+
+bool Simulation::roll_back()
+{
+    if (!good_ || clock_.time <= trouble_) return false;
+    trouble_ = clock_.time;
+    particles_ = good_->particles;
+    clock_ = good_->clock;
+    my_pairs_ = good_->pairs, my_particle_steps_ = good_->particle_steps;
+    clock_.base_time = clock_.time, clock_.base_step = clock_.step;
+    clock_.step_scale *= 0.5;
+    domain_.migrate(particles_);
+    rebuild(false);
+    return true;
 }
 
 std::size_t Simulation::row_bytes() const

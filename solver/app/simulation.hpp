@@ -38,6 +38,10 @@ struct Clock {
     DissipatedUnits dissipated; // over ranks (kept by rank 0)
     double energy_at_start = 0; // J
     double energy_unit = 0;     // J
+    // Steps are the scene's times step_scale since base_step, which began at base_time: 1, 0, 0 unless a retry halved them.
+    double step_scale = 1, base_time = 0; // 1, s
+    std::int64_t base_step = 0;
+    std::int64_t inspected = 0; // step of the guard's last look
 };
 
 class Simulation {
@@ -67,6 +71,10 @@ public:
     const Comm& comm() const { return comm_; }
     Timers& timers() { return timers_; }
 
+    /// Collective. Back to the last state that the guard found good, to go on with half the step; only with time.retry.
+    /// False, and nothing changed, if there is none or this trouble was met before.
+    bool roll_back();
+
     /// Collective: energies of now.
     Ledger ledger() const;
     /// (sum of energies - that at the start)/(potential drop).
@@ -80,6 +88,8 @@ public:
     struct Structure {
         std::int64_t rebuilds = 0, cuts = 0, migrated = 0;
         double imbalance = 1; // max/mean of the ranks' busy seconds, as last measured
+        // what the guard saw, at its last look and at its worst
+        double clumped = 0, most_clumped = 0, deepest = 0;
     };
     const Structure& structure() const { return structure_; }
     Index ghosts() const { return n_ghosts_; }
@@ -109,11 +119,18 @@ private:
     void renew_walls();
     void make_records();
     bool outgrown() const;
-    /// A particle went further than its smoothing length in the last step.
-    bool outran() const;
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
     std::size_t row_bytes() const;
-    [[noreturn]] void report_failure();
+    /// Looks for limits that broke in the last step; throws NumbersFailed.
+    void judge_step();
+    /// The guard's look at energies and neighbourhoods, after a list rebuild. Throws NumbersFailed.
+    void inspect();
+    /// Throws NumbersFailed with what happened to this particle, where, and the remedy.
+    [[noreturn]] void blame(std::int64_t id, const std::string& what, const std::string& remedy);
+    /// Id of the fastest particle, the lowest of several.
+    std::int64_t fastest() const;
+    /// Which limit of stability the present step breaks, and what to do: {what, remedy}.
+    std::pair<std::string, std::string> diagnosis() const;
 
     const Comm& comm_;
     Scene scene_;
@@ -143,6 +160,13 @@ private:
     double busy_before_ = 0;
     std::int64_t my_pairs_ = 0, my_particle_steps_ = 0;
     Structure structure_;
+    struct Good {
+        Particles particles;
+        Clock clock;
+        std::int64_t pairs, particle_steps;
+    };
+    std::optional<Good> good_; // for time.retry
+    double trouble_ = -1;      // s, when the last retried failure happened
     Timers timers_;
 };
 

@@ -173,6 +173,7 @@ struct Space {
 struct Time {
     double end;                 // s
     std::optional<double> step; // s, fixed step
+    bool retry = false;         // on failing numbers: back to the last good state, on with half the step
     bool operator==(const Time&) const = default;
 };
 

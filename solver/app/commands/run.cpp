@@ -50,6 +50,8 @@ std::string header_text(const Simulation& sim)
                                   {"dissipated", {d.plastic, d.viscous, d.wall, d.damping}},
                                   {"energy_at_start", c.energy_at_start},
                                   {"energy_unit", c.energy_unit},
+                                  {"stepping", {c.step_scale, c.base_time}},
+                                  {"steps_from", {c.base_step, c.inspected}},
                                   {"model", sim.model().name()},
                                   {"instruction_set", instruction_set()},
                                   {"version", version()}}
@@ -67,6 +69,8 @@ Clock clock_from(const std::string& header, const io::Path& file)
         const auto& d = j.at("dissipated");
         c.dissipated = {d.at(0), d.at(1), d.at(2), d.at(3)};
         c.energy_at_start = j.at("energy_at_start"), c.energy_unit = j.at("energy_unit");
+        c.step_scale = j.at("stepping").at(0), c.base_time = j.at("stepping").at(1);
+        c.base_step = j.at("steps_from").at(0), c.inspected = j.at("steps_from").at(1);
         return c;
     } catch (const nlohmann::json::exception& e) {
         throw IoFailed(fmt::format("{}: the clock of this checkpoint cannot be read ({})", file.string(), e.what()));
@@ -273,6 +277,9 @@ private:
         j["rebuilds"] = sim_->structure().rebuilds;
         j["repartitions"] = sim_->structure().cuts;
         j["pair_model"] = sim_->model().name();
+        const auto& seen = sim_->structure();
+        j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
+        j["retries"] = retries_;
         io::write_json(comm_, dir_->summary(), j);
 
         auto report = phase_report(sim_->timers(), work, threads_, comm_);
@@ -299,6 +306,25 @@ private:
         return w;
     }
 
+    /// One step; where it fails and the scene allows it, back and on with half the step.
+    Wishes advance()
+    {
+        const Wishes mine = wishes();
+        try {
+            return sim_->step(mine);
+        } catch (const NumbersFailed& e) {
+            const double time = sim_->time();
+            const std::int64_t step = sim_->steps();
+            if (!sim_->roll_back()) throw;
+            // What was written after the good state is taken back.
+            snapshots_.emplace(comm_, dir_->snapshots(), sim_->time());
+            history_.emplace(comm_, dir_->history(), scene_.dimensions, sim_->time());
+            retries_.push_back({{"failed_time", time}, {"failed_step", step}, {"from_time", sim_->time()}, {"message", e.what()}});
+            say(fmt::format("retry: {}. Back to t = {:g} s, on with half the step", e.what(), sim_->time()));
+            return {};
+        }
+    }
+
     Exit loop()
     {
         std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
@@ -312,7 +338,7 @@ private:
             outputs(sim.steps() == 0 ? -1 : sim.time(), sim.finished());
             while (!sim.finished()) {
                 const double before = sim.time();
-                const Wishes w = sim.step(wishes());
+                const Wishes w = advance();
                 loop_seconds_ = now() - begin;
                 outputs(before, sim.finished());
                 progress.show(sim, residual_);
@@ -368,6 +394,7 @@ private:
     double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, residual_ = 0;
     bool stop_file_ = false;
     std::int64_t first_step_ = 0;
+    std::vector<nlohmann::ordered_json> retries_;
 };
 
 } // namespace
