@@ -96,10 +96,11 @@ struct StressDiffusion {
 
 /// Correction of the velocity gradient, exact for linear velocity fields whatever the neighbours:
 ///     grad v <- (grad v) M^-1,  M = sum_j V_j (x_j - x_i) (x) grad W.  Bonet & Lok (1999); Bui & Nguyen (2021).
-/// Where M is too far from a multiple of 1 (a lonely particle, a pair, a thread of them) the plain gradient is kept.
+/// Where the support is too empty or lopsided for M to be trusted (spray, a toe one particle thin) the plain gradient is
+/// kept: there the correction would turn noise into density. tr M/d is 1 inside, 3/4 at a plane surface, 1/2 in a corner.
 struct GradientCorrection {
-    static constexpr double least_isotropy = 0.1; // det M over (tr M/dimensions)^dimensions
-    static constexpr double least_trace = 0.1;    // tr M/dimensions
+    static constexpr double least_isotropy = 0.5; // det M over (tr M/dimensions)^dimensions
+    static constexpr double least_trace = 0.4;    // tr M/dimensions
     /// M^-1 of a symmetric M (3-D, or 2-D in x-z), or 1 where M is too far from isotropic.
     template <class V> static KUZURE_INLINE Sym3<V> inverse(Sym3<V> m, int dimensions)
     {
