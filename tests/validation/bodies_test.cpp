@@ -144,7 +144,7 @@ TEST(Bodies, SpinOfTheStandardGradientIsHeldByItsSurface)
         EXPECT_TRUE(c.at_most(name + ", standard gradient: spurious strain rate over omega", s.spurious, "1", 1e-3,
                               {.note = cause, .achieved = 0.2}));
         EXPECT_TRUE(c.at_most(name + ", standard gradient, 1 turn: change of radius", s.radius_change, "1", 0.01,
-                              {.note = cause, .achieved = 0.05}));
+                              {.note = cause, .achieved = 0.06}));
         EXPECT_TRUE(c.at_most(name + ", standard gradient: linear momentum over m v", s.momentum, "1", 1e-12));
         EXPECT_TRUE(c.at_least(name + ", standard gradient: turns until a tenth of the spin is lost", s.turns_to_a_tenth, "1", 100,
                                {.note = cause, .achieved = 0.2}));
@@ -224,4 +224,41 @@ TEST(Bodies, EnergyLedgerCloses)
                                    1 + sim.residual(l) - l.dissipated.viscous / -l.state.potential, "1", s.limit));
         }
     }
+}
+
+// A free elastic block that rings with noise on every wavelength: its energy must not grow. H6, H12. The leap-frog evaluates
+// velocity and stress rates in one pass, which makes it Adams-Bashforth 2 for elastic waves: without viscosity an oscillation
+// grows by (omega dt)^4/4 a step, so the growth over a given time falls with dt^3.
+TEST(Bodies, NoiseDoesNotGrow)
+{
+    Case c("H12");
+    for (const double alpha : {0.0, 0.1})
+        for (const double cfl : {0.1, 0.2, 0.4}) {
+            SceneText t;
+            t.bodies = box("body", {0, 0, 0}, {0.4, 0, 0.4});
+            t.accuracy = fmt::format("kernel = \"cubic spline\"\ncfl = {}", cfl);
+            if (alpha > 0) t.effects = fmt::format("viscosity = {{ alpha = {}, beta = 0.0 }}", alpha);
+            t.end = 4 / t.p_wave();
+            std::mt19937_64 random(5);
+            std::uniform_real_distribution<double> kick(-1e-4, 1e-4);
+            Simulation sim(Comm::world(), t.scene(), starting_with([&](Particles& p, Index i, Vector) {
+                               set_velocity(p, i, {kick(random), 0, kick(random)});
+                           }));
+            const auto energy = [&] {
+                const auto l = sim.ledger();
+                return l.state.kinetic + l.state.elastic;
+            };
+            const double start = energy();
+            run_to(sim, t.end);
+            const std::string what =
+                fmt::format("energy of noise after 200 dx/c_p over that at the start, cfl = {}, alpha = {}", cfl, alpha);
+            const double ratio = energy() / start;
+            if (alpha > 0) {
+                EXPECT_TRUE(c.at_most(what, ratio, "1", 1));
+            } else if (cfl < 0.3) {
+                EXPECT_TRUE(c.at_most(what, ratio, "1", 1, {.note = "Adams-Bashforth 2: grows by (omega dt)^4/4 a step", .achieved = 1.3}));
+            } else {
+                c.report(what, ratio, "1", "Adams-Bashforth 2: grows by (omega dt)^4/4 a step");
+            }
+        }
 }

@@ -10,7 +10,7 @@ struct Rebound {
     int pieces = 0;
 };
 
-inline Rebound collide(Case& c, double spacing, double epsilon, double end, const std::string& accuracy = "kernel = \"cubic spline\"")
+inline Rebound collide(Case& c, double spacing, double epsilon, double end, const std::string& accuracy = "kernel = \"wendland c2\"")
 {
     SceneText t;
     t.spacing = spacing, t.h = 1.5, t.accuracy = accuracy;
@@ -53,10 +53,12 @@ inline Rebound collide(Case& c, double spacing, double epsilon, double end, cons
         r.speed = -left / count / u;
     }
     r.pieces = pieces(sim, 2 * spacing);
-    c.curve(fmt::format("rings_{}_{}", spacing, epsilon), {"time", "velocity_left", "least_distance"}, rows);
+    const std::string name =
+        fmt::format("{:.3g}mm_eps_{}_{}", 1000 * spacing, epsilon, accuracy.find("cubic") < accuracy.size() ? "cubic" : "c2");
+    c.curve("history_" + name, {"time", "velocity_left", "least_distance"}, rows);
     rows.clear();
     each(sim, [&](Index i) { rows.push_back({position(sim, i).x, position(sim, i).z, trace(stress(sim, i)) / 3}); });
-    c.curve(fmt::format("rings_end_{}_{}", spacing, epsilon), {"x", "z", "mean_stress"}, rows);
+    c.curve("end_" + name, {"x", "z", "mean_stress"}, rows);
     return r;
 }
 
