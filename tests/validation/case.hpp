@@ -254,22 +254,29 @@ public:
     testing::AssertionResult at_least(const std::string& what, double result, const std::string& unit, double limit,
                                       const Extra& extra = {})
     {
-        record(what, "\"\"", result, unit, fmt::format(">= {:.4g}", limit), result >= limit, extra.note);
+        record(what, "\"bound\"", result, unit, fmt::format(">= {:.4g}", limit), result >= limit, extra.note);
         return judge(result >= extra.achieved.value_or(limit), what, result, unit,
                      fmt::format("at least {:.4g}", extra.achieved.value_or(limit)));
     }
-    /// A negative control: what near() says of a setting that must not meet its criterion. Recorded as passed if it does not.
+    /// A negative control: a setting that must not meet the criterion. Recorded as passed if it does not; returns whether it does.
+    bool control(const std::string& what, double result, const std::string& unit, const std::string& criterion, bool met)
+    {
+        record("control: " + what, "\"must fail\"", result, unit, criterion, !met, "");
+        return met;
+    }
     bool control(const std::string& what, double reference, double result, const std::string& unit, double tolerance)
     {
-        const bool met = std::fabs(result / reference - 1) <= tolerance;
-        record("control: " + what, fmt::format("{:.6g}", reference), result, unit, fmt::format("not within {:.3g} %", 100 * tolerance),
-               !met, "");
-        return met;
+        return control(what, result, unit, fmt::format("{:.6g} +-{:.3g} %", reference, 100 * tolerance),
+                       std::fabs(result / reference - 1) <= tolerance);
+    }
+    bool control_at_most(const std::string& what, double result, const std::string& unit, double limit)
+    {
+        return control(what, result, unit, fmt::format("<= {:.4g}", limit), result <= limit);
     }
     /// A number that no criterion is put on.
     void report(const std::string& what, double result, const std::string& unit, const std::string& note = {})
     {
-        record(what, "\"\"", result, unit, "reported", true, note);
+        record(what, "\"none\"", result, unit, "reported", true, note);
     }
     /// A table for plotting, <case>_<name>.csv.
     void curve(const std::string& name, const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) const

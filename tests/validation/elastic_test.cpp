@@ -31,9 +31,10 @@ TEST(Elastic, CoarseRingsRebound)
     const auto r = collide(c, dx, 0.3, 4.0e-4);
     EXPECT_TRUE(c.near("pieces after the rebound, dx = r/6", 2, r.pieces, "1", 0));
     EXPECT_TRUE(c.at_least("least distance, dx = r/6", r.least_distance, "dx", 0.5));
+    EXPECT_TRUE(c.at_most("particles with a neighbour nearer than 0.6 dx, share, dx = r/6", r.clumped, "1", 1e-3));
     EXPECT_TRUE(c.at_least("speed of parting over that of meeting, dx = r/6", r.speed, "1", 0.5));
     // Negative control: without artificial stress the rings clump and break.
     const auto broken = collide(c, dx, 0, 2.5e-4);
-    EXPECT_FALSE(c.control("pieces, eps = 0", 2, broken.least_distance < 0.1 ? 100 : broken.pieces, "1", 0.5));
-    EXPECT_LT(broken.least_distance, 0.1);
+    EXPECT_FALSE(c.control("least distance, eps = 0, dx = r/6", broken.least_distance, "dx", ">= 0.5", broken.least_distance >= 0.5));
+    EXPECT_FALSE(c.control("pieces, eps = 0, dx = r/6", broken.pieces, "1", "at most 2", broken.pieces <= 2));
 }

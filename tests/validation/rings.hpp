@@ -7,6 +7,7 @@ namespace kuzure::validation {
 struct Rebound {
     double speed = 0;          // m/s at which the rings part, over that at which they met
     double least_distance = 0; // spacings, over the run
+    double clumped = 0;        // share of particles with a neighbour nearer than 0.6 spacings at the end
     int pieces = 0;
 };
 
@@ -53,6 +54,11 @@ inline Rebound collide(Case& c, double spacing, double epsilon, double end, cons
         r.speed = -left / count / u;
     }
     r.pieces = pieces(sim, 2 * spacing);
+    each(sim, [&](Index i) {
+        bool near = false;
+        each(sim, [&](Index j) { near = near || (j != i && length(position(sim, j) - position(sim, i)) < 0.6 * spacing); });
+        r.clumped += double(near) / sim.particles().size();
+    });
     const std::string name =
         fmt::format("{:.3g}mm_eps_{}_{}", 1000 * spacing, epsilon, accuracy.find("cubic") < accuracy.size() ? "cubic" : "c2");
     c.curve("history_" + name, {"time", "velocity_left", "least_distance"}, rows);
