@@ -12,6 +12,7 @@ inline const std::string soft_surface = "surface rows lack stiffness (T +20, +12
 struct Swing {
     double period = 0, amplitude = 0; // s, m
     double swings = 0;                // periods
+    double failed_at = 0;             // s; 0: it did not
     int pieces = 0;
 };
 
@@ -42,7 +43,12 @@ inline Swing swing(Case& c, int across, double throw_speed, double periods, doub
     ZeroCrossings tip;
     std::vector<std::vector<double>> rows;
     while (!sim.finished() && tip.times().size() < std::size_t(2 * periods)) {
-        sim.step();
+        try {
+            sim.step();
+        } catch (const NumbersFailed&) { // the plate flew apart
+            s.failed_at = sim.time();
+            break;
+        }
         if (sim.steps() % 20) continue;
         double sum = 0;
         int count = 0;
