@@ -115,7 +115,8 @@ def draw(case, runs):
     case.curve("experiment-failure", x_mm=FAILURE[:, 0], z_mm=FAILURE[:, 1])
     plots = []
     for colour, (label, name, m) in zip(COLOURS, runs):
-        profile = case.curve(f"profile-{name}", x_mm=m["at"], z_mm=m["height"])
+        apart = slice(None, None, 8)  # mm: about one point for each column that the height was measured in
+        profile = case.curve(f"profile-{name}", x_mm=m["at"][apart], z_mm=m["height"][apart])
         line = case.curve(f"failure-{name}", x_mm=m["line_x"], z_mm=m["line_z"])
         plots += [f"'{profile}' every ::1 u 1:($2>0.3?$2:1/0) w l lw 2 lc rgb '{colour}' t '{label}'",
                   f"'{line}' every ::1 u 1:2 w l lw 1.6 dt 2 lc rgb '{colour}' notitle"]
