@@ -4,7 +4,7 @@ Environment: KUZURE (program; default build/release/kuzure), KUZURE_RESULTS (rec
 results/validation), KUZURE_FIGURES (default $KUZURE_RESULTS/figures), KUZURE_THREADS (default 1).
 Only numpy, h5py and the gnuplot program are needed, all from Debian.
 """
-import copy, hashlib, json, os, subprocess
+import copy, hashlib, json, os, shutil, subprocess
 
 import h5py
 import numpy as np
@@ -84,10 +84,10 @@ def program_fingerprint():
     return _fingerprint
 
 
-def accepted(scene, scratch="check"):
+def accepted(scene):
     """(True, "") if `kuzure check` takes the scene, else (False, why): effects that are not built yet are refused, not ignored."""
     os.makedirs(RESULTS, exist_ok=True)
-    file = os.path.join(RESULTS, f"{scratch}-{os.getpid()}.toml")
+    file = os.path.join(RESULTS, f"check-{os.getpid()}.toml")
     with open(file, "w") as f:
         f.write(toml(scene))
     done = subprocess.run([PROGRAM, "check", file], capture_output=True, text=True)
@@ -141,7 +141,9 @@ def run(scene, case, name, minutes=8.0, fresh=False):
     file = os.path.join(folder, name + ".toml")
     with open(file, "w") as f:
         f.write(text)
-    subprocess.run(["rm", "-rf", out, stamp], check=True)
+    shutil.rmtree(out, ignore_errors=True)
+    if os.path.exists(stamp):
+        os.remove(stamp)
     command = [PROGRAM, "run", file, "-o", out, "--threads", THREADS, "--max-minutes", str(minutes), "--quiet"]
     environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
     done = subprocess.run(command, capture_output=True, text=True, timeout=60 * minutes + 120, env=environment)

@@ -102,9 +102,9 @@ def gate_at_2(m):
 
 def record_gate_at_2(case, m):
     more = {"seconds": m["seconds"], "figure": "v_exp_3_runout.png"}
-    case.record("plane, a = 2: run-out", "2.40 to 3.60", m["runout"], "L0", "inside", 2.40 <= m["runout"] <= 3.60,
+    case.record("plane, a = 2: gate on the run-out", "2.40 to 3.60", m["runout"], "L0", "inside", 2.40 <= m["runout"] <= 3.60,
                 note=f"outermost grain {m['runout_history']:.2f}", **more)
-    case.record("plane, a = 2: height", "0.8 to 1.7", m["height"], "L0", "inside", 0.8 <= m["height"] <= 1.7, **more)
+    case.record("plane, a = 2: gate on the height", "0.8 to 1.7", m["height"], "L0", "inside", 0.8 <= m["height"] <= 1.7, **more)
 
 
 def control(case):

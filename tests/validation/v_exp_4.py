@@ -96,13 +96,13 @@ def draw(case, swept):
         times.append(f"'{file}' every ::1 u 1:($2>0?$2:1/0) w l lw 1.8 lc rgb '{colour}' t 'SRF {m['srf']:.3f}'")
     figure("v_exp_4_slope", f"""set multiplot layout 1,2
 set logscale y; set format y '10^{{%L}}'; set ylabel 'greatest displacement {FREE:g} s after damping (m)'; set xlabel 'strength reduction factor SRF'
-set xrange [1.15:2.05]; set yrange [1e-4:100]; set key top left font ',9'; set title 'Slope of Griffiths & Lane, example 1: cones'
+set xrange [1.15:2.05]; set yrange [1e-4:100]; set key top left font ',9'; set title 'Slope of Griffiths and Lane, example 1'
 set arrow from {CHART},1e-4 to {CHART},2 nohead dt 2 lw 1.4 lc rgb 'black'; set label 'chart {CHART:.2f}' at {CHART},2e-4 offset 0.5,0 font ',9'
 set arrow from {PREDICTED['compression']},1e-4 to {PREDICTED['compression']},2 nohead dt 2 lw 1.4 lc rgb '{COLOURS[3]}'
-set label 'predicted for the\ncompression cone {PREDICTED['compression']:.2f}' at {PREDICTED['compression']},4e-4 offset 0.5,0 font ',9'
+set label "predicted for the\\ncompression cone {PREDICTED['compression']:.2f}" at {PREDICTED['compression']},4e-4 offset 0.5,0 font ',9'
 plot {', '.join(plots)}
-unset arrow; unset label; set xrange [0:8]; set yrange [1e-3:10]
-set key bottom right font ',9'; set xlabel 'time since the end of damping (s)'; set ylabel 'greatest displacement (m)'; set title '{swept[0][0]}'
+unset arrow; unset label; set xrange [0:8]; set yrange [1e-3:100]
+set key top left font ',9'; set xlabel 'time since the end of damping (s)'; set ylabel 'greatest displacement (m)'; set title '{swept[0][0]}'
 plot {', '.join(times)}
 unset multiplot
 """, size=(1000, 440))

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-from common import COLOURS, GRAVITY, Case, changed, components, figure, neighbour_pairs, run, surface
+from common import GRAVITY, Case, changed, components, figure, neighbour_pairs, run, surface
 
 LENGTH, HEIGHT = 4.0, 2.0  # m
 
