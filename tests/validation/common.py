@@ -306,7 +306,9 @@ def figure(name, commands, size=(840, 520), svg=True):
 set border 3 lc rgb '#404040'; set tics nomirror out textcolor rgb '#404040'; set grid lc rgb '#e4e4e4' lw 1
 set key Left reverse samplen 2 spacing 1.15
 """
-    terminals = [("png", f"set terminal pngcairo size {size[0]},{size[1]} font 'DejaVu Sans,11' lw 1.3\n")]
+    # Thousands of particles: without smoothed edges, a third of the bytes.
+    smooth, font = ("pngcairo", "DejaVu Sans,11") if svg else ("png", "DejaVuSans,10")
+    terminals = [("png", f"set terminal {smooth} size {size[0]},{size[1]} font '{font}'{' lw 1.3' if svg else ''}\n")]
     if svg:
         terminals.append(("svg", f"set terminal svg size {size[0]},{size[1]} font 'DejaVu Sans,13' lw 1.3 background rgb 'white'\n"))
     for ending, terminal in terminals:

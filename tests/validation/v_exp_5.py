@@ -84,11 +84,11 @@ def draw(case, with_stress, without):
     for title, name, m in ((f"artificial stress eps = 0.5: corner down {with_stress['drop']:.2f} m, least spacing {with_stress['spacing']:.2f}", "eps-0.5", with_stress),
                            (f"without: corner down {without['drop']:.2f} m, least spacing {without['spacing']:.2f}", "eps-0", without)):
         file = case.curve(f"particles-{name}", x_m=m["points"][:, 0], z_m=m["points"][:, 1], plastic_strain=m["strain"])
-        panels.append(f"set title '{title}'; plot '{file}' every ::1 u 1:2:($3>2?2:$3) w p pt 7 ps 0.36 lc palette notitle")
+        panels.append(f"set title '{title}'; plot '{file}' every ::1 u 1:2:($3>2?2:$3) w p pt 7 ps 0.5 lc palette notitle")
     figure("v_exp_5_block", """set multiplot layout 2,1
-set size ratio -1; set xrange [0:5.4]; set yrange [0:2.1]; set cbrange [0:2]; set ylabel 'z (m)'; set xlabel 'x (m)'; set cblabel 'plastic shear strain'
+set size ratio -1; set xrange [1.8:5.3]; set yrange [0:2.1]; set cbrange [0:2]; set ylabel 'z (m)'; set xlabel 'x (m)'; set cblabel 'plastic shear strain'
 set palette defined (0 '#30307a', 0.5 '#2a9d8f', 1 '#e9c46a', 2 '#d1495b'); set ytics 0.5
-""" + "\n".join(panels) + "\nunset multiplot\n", size=(860, 760), svg=False)
+""" + "\n".join(panels) + "\nunset multiplot\n", size=(620, 820), svg=False)
 
 
 def main(quick=False, slow=False):
