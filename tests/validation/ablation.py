@@ -17,7 +17,7 @@ COLUMN_DX, BLOCK_DX, SLOPE_DX = 0.004, 0.08, 0.5
 
 def column(result):
     m = v_exp_1.measure(result, 4)
-    return {"x at 5 mm (mm)": m["toe"], "height (mm)": float(m["height"].max()), "stress noise": stress_noise(result.snapshot(1), COLUMN_DX, 2650.0)}
+    return {"x at 5 mm (mm)": m["toe"], "height at 100 mm (mm)": float(np.interp(100.0, m["at"], m["height"])), "stress noise": stress_noise(result.snapshot(1), COLUMN_DX, 2650.0)}
 
 
 def block(result):
@@ -92,15 +92,14 @@ def compare(case, effect, scene_name, without, having, measure):
 
 
 def table(rows, skipped):
-    lines = ["| effect | scene | cost of a step | measured | without | with | change |", "|---|---|---|---|---|---|---|"]
+    lines = ["| effect | scene | cost of a step | answer without -> with |", "|---|---|---|---|"]
     for r in rows:
+        parts = []
         for k in dict(r["without"], **r["with"]):
             a, b = r["without"].get(k, np.nan), r["with"].get(k, np.nan)
-            change = f"{100 * (b / a - 1):+.1f} %" if a and np.isfinite(a * b) else "-"
-            lines.append(f"| {r['effect']} | {r['scene']} | {r['cost']:+.0f} % | {k} | {a:.4g} | {b:.4g} | {change} |")
-        if r["note"]:
-            lines.append(f"| {r['effect']} | {r['scene']} | {r['cost']:+.0f} % | {r['note']} | | | |")
-    lines += [f"| {effect} | | not in this build | | | | |" for effect in skipped]
+            parts.append(f"{k} {a:.4g} -> {b:.4g}" + (f" ({100 * (b / a - 1):+.1f} %)" if a and np.isfinite(a * b) else ""))
+        lines.append(f"| {r['effect']} | {r['scene']} | {r['cost']:+.0f} % | {'; '.join(parts + ([r['note']] if r['note'] else []))} |")
+    lines += [f"| {effect} | | not in this build | |" for effect in skipped]
     return "\n".join(lines) + "\n"
 
 
