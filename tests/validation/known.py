@@ -22,6 +22,8 @@ MISSES = {
     ("V-EXP-3", "plane: exponent of the run-out above the break"):
         "model bias, as the reference warns: tall columns of a frictional continuum run too far (Kumar 2015)",
     ("V-EXP-3", "axisymmetric: exponent of the run-out below the break"): THIN,
+    ("V-EXP-3", "axisymmetric: exponent of the run-out above the break"):
+        "not separated: two columns only (a = 2 and 5), the lower one short for the reason above, the higher one long like tall columns in plane strain",
     ("V-EXP-4", "factor of safety, cone plane strain, H/dx 20"): EARLY,
     ("V-EXP-4", "factor of safety, cone compression, H/dx 20"): EARLY,
     ("V-EXP-4", "stable slope (SRF 1) at rest, cubic spline, h 1.3 (the default): displacement after 8 s"): CHECKERBOARD,
