@@ -1,0 +1,56 @@
+#!/usr/bin/python3
+"""The whole validation suite: validate.py [--quick | --slow] [--known] [--publish] [PROGRAM] [CASE...]
+
+--quick    coarse runs, under three minutes: for every day
+--slow     also the expensive ends: V-EXP-1 at 1 mm, V-EXP-3 at a = 20
+--known    a gate that known.py lists, with its reason, may be missed: what tests ask for. One that is met must leave the list
+--publish  write docs/verification.md and docs/figures instead of a page among the results
+Exit status 1 if a gate is missed or a negative control passes, or a run fails; every case runs all the same.
+"""
+import os, sys, time
+
+
+def main(arguments):
+    flags = {a for a in arguments if a.startswith("--")}
+    rest = [a for a in arguments if not a.startswith("--")]
+    if unknown := flags - {"--quick", "--slow", "--known", "--publish"}:
+        print(f"validate: unknown {' '.join(sorted(unknown))}\n{__doc__}")
+        return 2
+    if rest and os.access(rest[0], os.X_OK) and os.path.isfile(rest[0]):
+        os.environ["KUZURE"] = os.path.abspath(rest.pop(0))
+    here = os.path.dirname(os.path.abspath(__file__))
+    docs = os.path.join(os.path.dirname(os.path.dirname(here)), "docs")
+    if "--publish" in flags:
+        os.environ["KUZURE_FIGURES"] = os.path.join(docs, "figures")
+
+    if "--known" in flags:
+        os.environ["KUZURE_KNOWN"] = "1"
+
+    # only now: the environment above is read when common is imported
+    import ablation, table, v_exp_1, v_exp_3, v_exp_4, v_exp_5
+    from common import PROGRAM, RESULTS, RunFailed
+
+    cases = {"V-EXP-1": v_exp_1, "V-EXP-3": v_exp_3, "V-EXP-4": v_exp_4, "V-EXP-5": v_exp_5, "ablation": ablation}
+    if unknown := set(rest) - set(cases):
+        print(f"validate: unknown case {' '.join(sorted(unknown))}; known: {' '.join(cases)}")
+        return 2
+    if not os.access(PROGRAM, os.X_OK):
+        print(f"validate: no program at {PROGRAM}. Build it (cmake --build --preset release) or name it: validate.py PROGRAM")
+        return 2
+    failures, begin = [], time.time()
+    for name, case in cases.items():
+        if rest and name not in rest:
+            continue
+        try:
+            if case.main("--quick" in flags, "--slow" in flags) != 0:
+                failures.append(f"{name}: see {os.path.join(RESULTS, name)}.jsonl")
+        except RunFailed as failure:
+            failures.append(str(failure))
+            print(failure)
+    table.main(os.path.join(docs, "verification.md") if "--publish" in flags else os.path.join(RESULTS, "verification.md"))
+    print(f"{time.time() - begin:.0f} s; " + (("all gates met" if "--known" not in flags else "nothing new") if not failures else f"{len(failures)} cases failed:\n  " + "\n  ".join(failures)))
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
