@@ -66,6 +66,7 @@ template <int W, class Model> struct alignas(64) Sums {
     double pushed[Model::tensile ? 3 : 1][W];      // sum V_j f^n tau_j . shape r
     double diffusion[Model::diffusive ? 8 : 1][W]; // sum q sigma_j, sum q, sum q g.r;  q = V_j shape r^2/(r^2 + 0.01 h^2)
     double moment[Model::corrected ? 6 : 1][W];    // sum V_j shape r (x) r
+    double walled[W];                              // 1 for a particle that feels a wall
 };
 
 template <class V> KUZURE_INLINE V load_narrow(const double* p)
@@ -218,6 +219,7 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
                 }
         }
     }
+    std::fill_n(out.walled, width<V>, 0.0);
     const V* rows[] = {&L.x.x, &L.x.y, &L.x.z, &L.y.x, &L.y.y, &L.y.z, &L.z.x, &L.z.y, &L.z.z};
     for (int k = 0; k < 9; ++k) store_wide(out.grad_v[k], *rows[k]);
     store_wide(out.force[0], A.x), store_wide(out.force[1], A.y), store_wide(out.force[2], A.z);
@@ -263,23 +265,25 @@ inline WallContact wall_contact(const scene::Wall& wall, Vector x, Vector v, con
     return w;
 }
 
-/// Coulomb's law for the force density (N/m^3) a particle gets from a surface: what would hold it is cut to tan(delta)
-/// times the force along the normal, and a surface that pulls lets go. Holding force: the no-slip wall's stress, and
-/// against the slip v_t the impedance rho c_p of the soil, without which shear stress would first have to build up in
-/// every layer that the wall touches, and sliding would feel less than its friction.
+/// Coulomb's law for the force density (N/m^3) a particle gets from a surface: along the surface at most tan(delta) times
+/// the force along the normal; a surface that would pull gives none. Where the soil slips, friction opposes the slip v_t;
+/// where it sticks, the stress of the no-slip wall holds it. Between the two the soil's impedance rho c_p decides: slip
+/// counts as sliding once rho c_p v_t alone would need the whole friction.
 struct WallFriction {
     Vector force;
-    double hold; // share of the holding shear that is left: 1 sticks, 0 slides freely
-    bool pulls;
+    double drag; // share of the no-slip wall's velocity gradient: slip along a surface is no strain of the soil
+    bool pulls;  // then the soil does not feel the surface at all: strain without force would make energy
 };
 inline WallFriction limit_to_friction(Vector force, Vector normal, double friction_angle, Vector slip, double impedance)
 {
     const double pressing = dot(force, normal);
     if (!(pressing > 0)) return {{}, 0, true};
-    const Vector shear = force - pressing * normal - impedance * slip;
-    const double held = length(shear), limit = std::tan(friction_angle) * pressing;
-    const double hold = held > limit ? limit / held : 1.0;
-    return {pressing * normal + hold * shear, hold, false};
+    const double limit = std::tan(friction_angle) * pressing;
+    const Vector sticking = force - pressing * normal, opposing = -impedance * slip;
+    const double needed = length(opposing), sliding = needed < limit ? needed / limit : 1.0;
+    Vector shear = (needed > limit ? limit / needed : 1.0) * opposing + (1 - sliding) * sticking;
+    if (const double size = length(shear); size > limit) shear = (limit / size) * shear;
+    return {pressing * normal + shear, 1 - sliding, false};
 }
 
 /// Adds the walls' share to the sums of a cluster; returns the pairs inside the support and the power that walls take.
@@ -315,7 +319,6 @@ template <class Model, class V, class T>
         const Vec3<V> vc{load<V>(colliding[0]), load<V>(colliding[1]), load<V>(colliding[2])};
         const V inverse_d = load<V>(inverse_distance);
         Vec3<V> G{zero, zero, zero}, B = G, P = G;
-        Sym3<V> M{zero, zero, zero, zero, zero, zero};
         for (const Index point : list) {
             const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
             const V r2_exact = dot(r, r), r2 = max(r2_exact, tiny);
@@ -336,18 +339,10 @@ template <class Model, class V, class T>
                 const V pressure = model.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 P = fma(pressure, g, P);
             }
-            if constexpr (Model::corrected)
-                M = {fma(g.x, r.x, M.xx), fma(g.y, r.y, M.yy), fma(g.z, r.z, M.zz),
-                     fma(g.x, r.y, M.xy), fma(g.y, r.z, M.yz), fma(g.x, r.z, M.xz)};
         }
         double sums[9][W];
         const V* rows[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
         for (int k = 0; k < 9; ++k) store_wide(sums[k], *rows[k]);
-        double moment[6][W];
-        if constexpr (Model::corrected) {
-            const V* of[] = {&M.xx, &M.yy, &M.zz, &M.xy, &M.yz, &M.xz};
-            for (int k = 0; k < 6; ++k) store_wide(moment[k], *of[k]);
-        }
         for (int k = 0; k < i.count; ++k) {
             const WallContact& c = contact[k];
             const Index at = i.first + k;
@@ -355,18 +350,15 @@ template <class Model, class V, class T>
             Vector b{pass.volume * sums[3][k], pass.volume * sums[4][k], pass.volume * sums[5][k]};
             const Vector q{pass.volume * sums[6][k], pass.volume * sums[7][k], pass.volume * sums[8][k]};
             Vector force = 2.0 * (c.stress * g) - q, mirrored = c.mirrored;
-            bool felt = true;
             if (wall.wall->surface == scene::Surface::Coulomb) {
                 // scale, the kernel's constant, is negative: the force on the particle points along scale * force
                 const Vector slip = mirrored - c.colliding;
                 const double impedance = p[field::density][at] * pass.records[at].sound_speed * length(scale * g);
                 const auto limited = limit_to_friction(scale * force, c.normal, wall.wall->friction_angle, slip, impedance);
                 force = (1 / scale) * limited.force;
-                // Where the surface slides, the soil beside it is dragged that much less.
-                mirrored = c.colliding + limited.hold * slip;
-                felt = !limited.pulls;
+                mirrored = c.colliding + limited.drag * slip;
+                if (limited.pulls) b = {};
             }
-            if (!felt) b = {};
             out.force[0][k] += force.x, out.force[1][k] += force.y, out.force[2][k] += force.z;
             const double vk[3] = {-mirrored.x, -mirrored.y, -mirrored.z};
             for (int a = 0; a < 3; ++a) {
@@ -374,9 +366,7 @@ template <class Model, class V, class T>
                 out.grad_v[3 * a + 1][k] = fma(vk[a], b.y, out.grad_v[3 * a + 1][k]);
                 out.grad_v[3 * a + 2][k] = fma(vk[a], b.z, out.grad_v[3 * a + 2][k]);
             }
-            if constexpr (Model::corrected)
-                if (felt)
-                    for (int a = 0; a < 6; ++a) out.moment[a][k] = fma(pass.volume, moment[a][k], out.moment[a][k]);
+            if (g.x != 0 || g.y != 0 || g.z != 0) out.walled[k] = 1;
             // taken by the wall per unit of rho_i V_i/m_i: -(v.f + sigma : L_wall); viscous: v.q
             const Stress s = sigma[at];
             const Vector sb = s * b;
@@ -491,7 +481,7 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
             const U to_m = U(-unit) * factor; // the sums hold r = x_i - x_j in `unit`
             Sym3<U> M{to_m * sum(sums.moment[0]), to_m * sum(sums.moment[1]), to_m * sum(sums.moment[2]),
                       to_m * sum(sums.moment[3]), to_m * sum(sums.moment[4]), to_m * sum(sums.moment[5])};
-            const Sym3<U> correction = GradientCorrection::inverse(M, dimensions);
+            const Sym3<U> correction = GradientCorrection::inverse(M, dimensions, one - sum(sums.walled));
             L = {correction * L.x, correction * L.y, correction * L.z};
         }
     // Stress rate of the diffusion, Pa/s

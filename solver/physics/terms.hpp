@@ -98,11 +98,12 @@ struct StressDiffusion {
 ///     grad v <- (grad v) M^-1,  M = sum_j V_j (x_j - x_i) (x) grad W.  Bonet & Lok (1999); Bui & Nguyen (2021).
 /// Where the support is too empty or lopsided for M to be trusted (spray, a toe one particle thin) the plain gradient is
 /// kept: there the correction would turn noise into density. tr M/d is 1 inside, 3/4 at a plane surface, 1/2 in a corner.
+/// It is kept beside walls too, whose mirrored velocities fill the support but are not linear.
 struct GradientCorrection {
     static constexpr double least_isotropy = 0.5; // det M over (tr M/dimensions)^dimensions
     static constexpr double least_trace = 0.4;    // tr M/dimensions
-    /// M^-1 of a symmetric M (3-D, or 2-D in x-z), or 1 where M is too far from isotropic.
-    template <class V> static KUZURE_INLINE Sym3<V> inverse(Sym3<V> m, int dimensions)
+    /// M^-1 of a symmetric M (3-D, or 2-D in x-z), or 1 where M is not to be trusted or allowed (1 or 0) is 0.
+    template <class V> static KUZURE_INLINE Sym3<V> inverse(Sym3<V> m, int dimensions, V allowed)
     {
         using T = number<V>;
         const V one(1), zero(0), half(T(0.5));
@@ -114,7 +115,7 @@ struct GradientCorrection {
         const auto good = [&](V a) {
             return select(less(V(T(least_isotropy)) * mean * mean * mean, det), select(less(V(T(least_trace)), mean), a, zero), zero);
         };
-        const V use = good(one), keep = one - use;
+        const V use = good(allowed), keep = one - use;
         const V per_det = use / fma(det, use, keep);
         return {fma(cxx, per_det, keep), fma(cyy, per_det, keep), fma(czz, per_det, keep), cxy * per_det, cyz * per_det, cxz * per_det};
     }
