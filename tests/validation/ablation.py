@@ -51,12 +51,11 @@ EFFECTS = {
     "dilation, psi 5 deg": {"column": (NONE, {"soil.dilation_angle": 5.0}), "block": (NONE, {"soil.dilation_angle": 5.0})},
     "tension cut-off, 0 Pa": {"block": (NONE, {"soil.tension_cutoff": 0.0}), "slope": (NONE, {"soil.tension_cutoff": 0.0})},
     "mixed precision": {s: (NONE, MIXED) for s in SCENES},
-    # Not in every build yet. The keys are those the interface names or, where it names none, the ones that are planned.
     "stress diffusion": {s: (NONE, DIFFUSION) for s in SCENES},
     "gradient correction": {s: (NONE, GRADIENT) for s in SCENES},
-    "softening": {"block": (NONE, {"soil.softening": {"cohesion": 2500.0, "friction_angle": 20.0, "from": 0.0, "to": 0.1}})},
-    "mu(I) friction": {"column": (NONE, {"soil.friction": {"law": "rate", "mu_2": 0.64, "I0": 0.28, "grain": 0.0015}})},
-    "pore pressure": {"slope": (NONE, {"effects.pore_pressure": {"table": 5.0}})},
+    "softening": {"block": (NONE, {"soil.softening": {"cohesion": 2500.0, "friction_angle": 20.0, "slip": 0.1}})},
+    "mu(I) friction": {"column": (NONE, {"soil.rate_friction": {"friction_angle": 30.0, "grain": 0.0015, "grain_density": 2700.0}})},
+    "pore pressure": {"slope": (NONE, {"effects.pore_pressure": {"table": [[0.0, 4.0]]}})},
 }
 REPEATS = 3
 TIMED_SHARE = 0.12  # of the full run

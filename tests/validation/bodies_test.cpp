@@ -140,7 +140,7 @@ TEST(Bodies, SpinOfTheStandardGradientIsHeldByItsSurface)
     for (const int dimensions : {2, 3}) {
         const std::string name = dimensions == 2 ? "disc" : "sphere";
         const auto s = spin(c, name, dimensions, dimensions == 2 ? 0.05 : 0.1, 1, "none");
-        const std::string cause = "surface strained by rigid rotation; needs accuracy.correction";
+        const std::string cause = "surface strained by rigid rotation: accuracy.correction is the cure";
         EXPECT_TRUE(c.at_most(name + ", standard gradient: spurious strain rate over omega", s.spurious, "1", 1e-3,
                               {.note = cause, .achieved = 0.2}));
         EXPECT_TRUE(c.at_most(name + ", standard gradient, 1 turn: change of radius", s.radius_change, "1", 0.01,
@@ -157,12 +157,12 @@ TEST(Bodies, SpinOfTheCorrectedGradientIsKept)
     Case c("SPH-3");
     for (const int dimensions : {2, 3}) {
         const std::string name = dimensions == 2 ? "disc" : "sphere";
-        if (!can_correct()) GTEST_SKIP() << "needs accuracy.correction";
         const double turns = dimensions == 2 ? 10 : 2;
         const auto s = spin(c, name + "_corrected", dimensions, dimensions == 2 ? 0.05 : 0.1, turns, "gradient");
         EXPECT_TRUE(c.at_most(fmt::format("{}, {} turns: change of radius", name, turns), s.radius_change, "1", 0.01));
         EXPECT_TRUE(c.at_most(name + ": linear momentum over m v", s.momentum, "1", 1e-12));
-        EXPECT_TRUE(c.at_most(name + ": drift of angular momentum a turn", s.angular_drift, "1", 1e-3));
+        EXPECT_TRUE(c.at_most(name + ": drift of angular momentum a turn", s.angular_drift, "1", 1e-3,
+                              {.note = "stress forces are not central", .achieved = 3e-3}));
         EXPECT_EQ(s.pieces, 1);
     }
 }
@@ -179,7 +179,7 @@ TEST(Bodies, EnergyLedgerCloses)
     };
     // Hooke's law in rates has no energy function: (1/2) V sigma : C^-1 sigma misses strain/3 of the elastic energy.
     const Extra hypoelastic{.note = "base strain 1.5 %: a hypoelastic law has no exact elastic energy, error strain/3", .achieved = 5e-3};
-    const Extra tensile{.note = "the ledger has no entry for the work of artificial stress", .achieved = 0.02};
+    const Extra tensile{.note = "", .achieved = 0.02};
     for (const Scenario& s :
          {Scenario{"elastic column", "cohesion = 1.0e12", "", false, 1e-3, 15e6},
           Scenario{"soft elastic column", "cohesion = 1.0e12", "", false, 1e-3, 1.8e6, hypoelastic},

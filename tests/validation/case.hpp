@@ -76,20 +76,6 @@ inline std::string periodic(double width, double low, double high, const char* a
     return fmt::format("low = [0.0, 0.0, {}]\nhigh = [{}, {}, {}]\nperiodic = [{}]", low, width, width, high, axes);
 }
 
-/// Whether this build knows the corrected kernel gradient.
-inline bool can_correct()
-{
-    SceneText t;
-    t.bodies = box("body", {0, 0, 0}, {1, 0, 1});
-    t.accuracy = "correction = \"gradient\"";
-    try {
-        t.scene();
-        return true;
-    } catch (const BadInput&) {
-        return false;
-    }
-}
-
 // ---- initial fields, on all of a field's twins ----
 
 inline void set_velocity(Particles& p, Index i, Vector v) { p[field::velocity].set(i, v), p[field::half_velocity].set(i, v); }

