@@ -1,0 +1,58 @@
+#pragma once
+// H13: a heap of dry soil that should stand still.
+#include "tests/stability/hard.hpp"
+#include <map>
+
+namespace kuzure::validation {
+
+struct Rest {
+    double drift = 0, kinetic = 0, early = 0, late = 0; // D in dx; greatest KE/PE_0 of the last quarter; creep of the first and last quarter, dx
+    double calm = 0;                                    // KE/PE_0 at the end
+};
+/// A heap with a factor of safety `fos`, settled with damping for 10 sqrt(H/g), then watched for `times` sqrt(H/g).
+inline Rest heap(double spacing, double fos, double times, const std::string& kernel, double h, const std::string& more = mild)
+{
+    SceneText t;
+    t.spacing = spacing, t.h = h, t.accuracy = "kernel = \"" + kernel + "\"";
+    t.strength = "friction_angle = 25.0\ncone = \"plane strain\"";
+    const double tangent = std::tan(25 * pi / 180), slope = std::tan(std::asin(3 * tangent / std::sqrt(9 + 12 * tangent * tangent))) / fos;
+    const double half = 0.8, high = half * slope, unit = std::sqrt(high / gravity), settle = 10 * unit;
+    t.bodies = polygon("body", {{-half, 0}, {half, 0}, {0, high}}, "soil = \"s\"\nstress = \"at rest\"");
+    const double wide = std::ceil(1.6 / spacing) * spacing;
+    t.walls = box("wall", {-wide, 0, -4 * spacing}, {wide, 0, 0}, "");
+    t.effects = weight + more + fmt::format("damping = {{ ratio = 0.5, until = {} }}\n", settle);
+    t.end = settle + times * unit;
+    Simulation sim(Comm::world(), t.scene());
+    run_to(sim, settle);
+    const auto where = [&] {
+        std::map<std::int64_t, Vector> x;
+        each(sim, [&](Index i) { x[sim.particles()[field::id][i]] = position(sim, i); });
+        return x;
+    };
+    const auto apart = [&](const std::map<std::int64_t, Vector>& from) {
+        double most = 0;
+        each(sim, [&](Index i) { most = std::max(most, length(position(sim, i) - from.at(sim.particles()[field::id][i]))); });
+        return most / spacing;
+    };
+    double potential = 0;
+    each(sim, [&](Index i) { potential += particle_mass(sim, i) * gravity * position(sim, i).z; });
+    const auto start = where();
+    Rest r;
+    run_to(sim, settle + 0.25 * times * unit);
+    r.early = apart(start);
+    run_to(sim, settle + 0.75 * times * unit);
+    const auto third = where();
+    const auto kinetic = [&] {
+        double sum = 0;
+        each(sim, [&](Index i) { sum += 0.5 * particle_mass(sim, i) * dot(velocity(sim, i), velocity(sim, i)); });
+        return sum / potential;
+    };
+    while (!sim.finished()) {
+        sim.step();
+        if (sim.steps() % 20 == 0) r.kinetic = std::max(r.kinetic, kinetic());
+    }
+    r.calm = kinetic(), r.drift = apart(start), r.late = apart(third);
+    return r;
+}
+
+} // namespace kuzure::validation
