@@ -69,8 +69,8 @@ std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, dou
     } else {
         const auto& points = std::get<Polygon>(shape).points;
         for (std::size_t k = 0; k < points.size(); ++k) {
-            const auto [ax, az] = points[k];
-            const auto [bx, bz] = points[(k + 1) % points.size()];
+            const auto &a = points[k], &b = points[(k + 1) % points.size()];
+            const double ax = a[0], az = a[1], bx = b[0], bz = b[1]; // no bindings: clang 14 keeps them out of lambdas
             if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin) continue;
             // The part of the edge within margin of the row's height.
             const auto x_at = [&](double height) {
