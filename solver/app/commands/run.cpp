@@ -379,8 +379,10 @@ private:
             }
             throw NumbersFailed(text);
         } catch (const IoFailed& e) {
-            throw IoFailed(std::string(e.what()) + (checkpoint_.empty() ? ". No checkpoint had been written"
-                                                                        : ". The last good checkpoint is " + checkpoint_.string()));
+            std::string text = e.what(); // a checkpoint that failed says itself which one is good
+            if (text.find("The last good checkpoint is") == text.npos)
+                text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
+            throw IoFailed(text);
         }
         write_summary("finished", Exit::Ok);
         progress.show(sim, residual_, true);
