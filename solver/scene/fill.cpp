@@ -321,8 +321,10 @@ Issues Filling::problems(const Scene& scene)
                                           scene.space.spacing),
                               {}});
     }
+    // One mistake may make every shape overlap every other: nobody reads a million lines, nor waits for them.
+    const std::size_t enough = 100;
     for (std::size_t i = 0; i < pieces.size(); ++i)
-        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
+        for (std::size_t j = i + 1; j < pieces.size() && issues.size() < enough; ++j) {
             const auto &a = pieces[i], &b = pieces[j];
             if (!a.lattice || !b.lattice) continue;
             const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);

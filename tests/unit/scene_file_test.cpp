@@ -351,6 +351,16 @@ TEST(SceneFile, AtMostTwentyProblemsAreShown)
     EXPECT_THAT(message, HasSubstr("and 10 more"));
 }
 
+TEST(SceneFile, ThousandsOfBodiesInOnePlaceAreRefusedAtOnce)
+{
+    // All pairs of them overlap: once that took all memory, and no end.
+    std::string text = least;
+    while (text.size() < 400000) text += "[[body]]\nsoil=\"sand\"\nbox={low=[0,0,0],high=[1,1,1]}\n";
+    const auto message = refusal(text);
+    EXPECT_THAT(message, HasSubstr("found an overlap of body.1 with body.0"));
+    EXPECT_LE(std::count(message.begin(), message.end(), '\n'), 20);
+}
+
 TEST(SceneFile, AnUnstableStepCanBeForced)
 {
     const std::vector<std::string> sets{"time.step=0.01"};
