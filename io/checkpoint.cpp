@@ -207,7 +207,8 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
 
 Path write_checkpoint(const Team& team, const Path& directory, const Particles& p, const std::string& scene_hash, const std::string& header)
 {
-    const Path file = directory / "checkpoint.h5", previous = directory / "checkpoint.prev.h5";
+    Path file = directory / "checkpoint.h5";
+    const Path previous = directory / "checkpoint.prev.h5";
     try {
         const std::int64_t total = team.sum(std::int64_t(p.size()));
         const auto first = std::uint64_t(team.sum_below(std::int64_t(p.size())));

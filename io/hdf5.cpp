@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <hdf5.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace kuzure::io {
@@ -65,8 +66,13 @@ Complaint last_complaint()
     return c;
 }
 
-/// From here on the library reports to us and not to the terminal.
-void be_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+/// From here on the library reports to us and not to the terminal. Nor does it clean up when the program ends: where it could
+/// not bring a file to a full disk, it tries again then, and crashes. Every file is closed long before.
+void be_quiet()
+{
+    static const int told = H5dont_atexit(); // before any other call
+    if (told >= 0) H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 hid_t access_for_our_files()
 {
@@ -118,7 +124,12 @@ H5Writer::H5Writer(const Team& team, const Path& file, std::uint64_t bytes) : te
         if (id_ < 0) throw IoFailed(complaint_);
     });
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
-    const std::string trouble = descriptor_ >= 0 ? "" : fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
+    std::string trouble = descriptor_ >= 0 ? "" : fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
+    // The room is taken beforehand, so that a disk that fills up meanwhile does not meet the library, which does not bear it,
+    // between two of its own writes. File systems that cannot do that go without.
+    if (team.rank() == 0 && descriptor_ >= 0 && bytes > 0 && ::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, off_t(bytes)) != 0 &&
+        errno == ENOSPC)
+        trouble = fmt::format("{}: taking {:.1f} MB failed: {}", file_.string(), double(bytes) / 1e6, cause(file_, ENOSPC));
     try {
         agree(team, trouble);
     } catch (...) {
@@ -224,6 +235,9 @@ void H5Writer::finish()
         const hid_t id = id_;
         id_ = -1;
         check(H5Fclose(id) >= 0, "closing");
+        // What was taken and not used goes back.
+        struct stat now;
+        check(::fstat(descriptor_, &now) == 0 && ::ftruncate(descriptor_, now.st_size) == 0, "trimming");
     }
     agree(team_, complaint_);
     on_root(team_, [&] { sync(temporary_); });

@@ -242,10 +242,10 @@ std::vector<Key> make_keys()
          Choice,
          "",
          Default,
-         "\"cubic spline\"",
+         "\"wendland c2\"",
          any,
          {"cubic spline", "wendland c2", "wendland c4"},
-         "\"cubic spline\"",
+         "\"wendland c2\"",
          "smoothing kernel"},
         {"accuracy.cfl", Number, "1", Default, "0.2", above(0), {}, "0.2", "Courant number of the step where time.step is absent"},
         {"accuracy.precision",
@@ -404,7 +404,7 @@ std::string Range::text() const
 
 std::string Key::expected() const
 {
-    const std::string of_unit = unit.empty() || unit == "1" ? "" : " in " + unit;
+    const std::string of_unit = unit.empty() || unit == "1" ? "" : unit.starts_with("of ") ? " " + unit : " in " + unit;
     const std::string limits = range.text().empty() ? "" : ", " + range.text();
     const auto one_of = [&] { return fmt::format("\"{}\"", fmt::join(choices, "\", \"")); };
     switch (kind) {
@@ -487,6 +487,13 @@ int edit_distance(std::string_view a, std::string_view b)
 
 std::string nearest(std::string_view written, const std::vector<std::string>& known)
 {
+    // What others call it is nearer than any word of similar letters.
+    static constexpr std::pair<std::string_view, std::string_view> others[] = {
+        {"rho", "density"},        {"E", "young"},    {"nu", "poisson"},    {"c", "cohesion"},   {"phi", "friction_angle"},
+        {"psi", "dilation_angle"}, {"dx", "spacing"}, {"dp", "spacing"},    {"dt", "step"},      {"g", "gravity"},
+        {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}};
+    for (const auto& [other, ours] : others)
+        if (written == other && std::find(known.begin(), known.end(), ours) != known.end()) return std::string(ours);
     // A very long word is near to nothing, and the table of distances would be large.
     const auto word = written.substr(0, 100);
     const auto best = std::min_element(known.begin(), known.end(),

@@ -193,9 +193,9 @@ void check_space(const Scene& scene, Rules& rules)
                                                "that no particle meets itself), found {:.6g} m; widen it",
                                                least, names[axis], period));
     }
-    if (scene.accuracy.kernel == Kernel::CubicSpline && space.h > 1.5)
-        rules.warning("space.h", text("the cubic spline lets particles pair up above h = 1.5 spacings, found {}; the "
-                                      "wendland kernels do not",
+    if (scene.accuracy.kernel == Kernel::CubicSpline && space.h > 1.25)
+        rules.warning("space.h", text("with the cubic spline, soil at rest swings in rows of alternating velocity above h = 1.25 "
+                                      "spacings, and pairs up above 1.5; found {}. Use 1.2, or a wendland kernel, which does neither",
                                       space.h));
 }
 
@@ -260,6 +260,84 @@ void check_effects(const Scene& scene, Rules& rules)
         rules.warning("effects.artificial_stress", "it is asked for and costs time, but " + why_no_tension(scene));
 }
 
+/// Numbers that are allowed but that hardly anybody means: nearly always a unit, a factor of 1e3 or radians.
+void check_plausible(const Scene& scene, Rules& rules)
+{
+    const auto angle_in_radians = [&](const std::string& key, double angle) {
+        if (angle > 0 && degrees(angle) < 2)
+            rules.warning(key, text("{:.4g} deg is nearly no friction: angles are in degrees (is it {:.4g} deg?)", degrees(angle),
+                                    degrees(degrees(angle))));
+    };
+    for (const auto& soil : scene.soils) {
+        const std::string key = "soil." + soil.name;
+        const double c_p = Material::from(soil).sound_speed, rho = soil.density;
+        // Below and above, squares and steps leave the range of double precision.
+        if (!(c_p > 1e-6 && c_p < 1e12)) {
+            rules.error(key + ".young", text("expected a P-wave speed between 1e-6 and 1e12 m/s, found {:.3g} m/s from young = {:.6g} Pa "
+                                             "and density = {:.6g} kg/m^3; correct them",
+                                             c_p, soil.young, rho));
+        } else if (rho < 100 || rho > 20000) {
+            const double factor = rho < 100 ? 1000 : 0.001;
+            rules.warning(key + ".density",
+                          text("{:.6g} kg/m^3 is no soil's density (100 .. 20000): is it in other units?{}", rho,
+                               rho * factor >= 100 && rho * factor <= 20000 ? text(" Then write {:.6g}", rho * factor) : std::string()));
+        } else if (c_p < 3 || c_p > 10000) {
+            rules.warning(key + ".young", text("with {:.6g} Pa the P-wave runs at {:.3g} m/s, in soils and rocks at 30 .. 6000 m/s: young "
+                                               "is in Pa (1 MPa = 1e6, 1 kPa = 1e3)",
+                                               soil.young, c_p));
+        }
+        if (soil.cohesion > 0.1 * soil.young)
+            rules.warning(key + ".cohesion", text("{:.6g} Pa is more than a tenth of young = {:.6g} Pa, where soils fail at strains of "
+                                                  "a percent: both are in Pa",
+                                                  soil.cohesion, soil.young));
+        if (soil.poisson > 0.49)
+            rules.warning(key + ".poisson", text("at {:.6g} the soil is nearly incompressible: its bulk modulus is {:.0f} times the "
+                                                 "shear modulus and shortens the step as its root; 0.49 is enough for undrained clay",
+                                                 soil.poisson, 2 * (1 + soil.poisson) / (3 * (1 - 2 * soil.poisson))));
+        angle_in_radians(key + ".friction_angle", soil.friction_angle);
+        if (const auto& w = soil.softening; w && w->slip < 1e-4 * scene.support())
+            rules.warning(key + ".softening.slip", text("a slip of {:.4g} m is nothing against the width of a shear band here, {:.4g} m: "
+                                                        "strength is lost at once; it is in m",
+                                                        w->slip, scene.support()));
+        if (const auto& r = soil.rate_friction; r && r->grain > 2 * scene.space.spacing)
+            rules.warning(key + ".rate_friction.grain",
+                          text("grains of {:.4g} m are larger than the particles they make up, {:.4g} m apart: "
+                               "it is in m",
+                               r->grain, scene.space.spacing));
+    }
+    for (std::size_t w = 0; w < scene.walls.size(); ++w)
+        if (scene.walls[w].surface == Surface::Coulomb)
+            angle_in_radians(text("wall.{}.surface.friction_angle", w), scene.walls[w].friction_angle);
+
+    const Effects& effects = scene.effects;
+    const bool all_rest = std::all_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return length(b.velocity) == 0; });
+    if (const auto& g = effects.gravity; g && length(*g) > 0) {
+        if (g->z > 0) rules.warning("effects.gravity", text("it points up ({} m/s^2 along z, which is up): write a minus", g->z));
+        if (length(*g) > 3000)
+            rules.warning("effects.gravity", text("{:.4g} m/s^2 is more than any centrifuge reaches: it is in m/s^2", length(*g)));
+        if (scene.walls.empty() && !(scene.space.periodic[2] && g->z != 0))
+            rules.warning("wall", "there is gravity and no wall: all soil falls without end; write a [[wall]] below it");
+    } else if (all_rest) {
+        rules.warning("effects.gravity", "there is no gravity and every body rests: nothing will move; write gravity = [0.0, 0.0, -9.81]");
+    }
+    if (const auto& water = effects.pore_pressure; water && (water->density < 500 || water->density > 3000))
+        rules.warning("effects.pore_pressure.density", text("{:.6g} kg/m^3 is no water's density: water has 1000", water->density));
+
+    const double step = scene.time.step.value_or(scene.accuracy.cfl * crossing_time(scene)), steps = scene.time.end / step;
+    if (steps > 1e8)
+        rules.warning("time.end", text("{:.3g} s are {:.3g} steps of {:.3g} s: times are in seconds", scene.time.end, steps, step));
+    const auto interval = [&](const char* key, const std::optional<double>& every, const char* what) {
+        if (every && *every > scene.time.end)
+            rules.warning(key, text("{:.6g} s is longer than the run ({:.6g} s): only the first and the last {} are written", *every,
+                                    scene.time.end, what));
+        else if (every && *every < 0.999 * step)
+            rules.warning(
+                key, text("{:.3g} s is shorter than a step ({:.3g} s): every step writes a {}, {:.3g} of them", *every, step, what, steps));
+    };
+    interval("output.every", scene.output.every, "snapshot");
+    interval("output.history", scene.output.history, "row");
+}
+
 void check_time(const Scene& scene, StepLimit limit, Rules& rules)
 {
     const auto severity = limit == StepLimit::Enforce ? Severity::Error : Severity::Warning;
@@ -278,6 +356,11 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
         else if (*step > recommended_step(scene))
             rules.warning("time.step", text("the step {:.4g} s is stable but above the recommended {:.4g} s ({} h/c_p)", *step,
                                             recommended_step(scene), recommended_courant));
+    } else if (const double steps = scene.time.end / (scene.accuracy.cfl * crossing_time(scene)); steps > 1e12) {
+        rules.error("time.end",
+                    text("expected fewer than 1e12 steps, found {:.3g} of {:.3g} s; is time.end in seconds, and young in Pa? Or "
+                         "is accuracy.cfl too small",
+                         steps, scene.accuracy.cfl * crossing_time(scene)));
     } else if (scene.accuracy.cfl > unstable_courant) {
         rules.issues.push_back({severity,
                                 "accuracy.cfl",
@@ -433,13 +516,21 @@ Issues check(const Scene& scene, StepLimit limit)
     check_bodies(scene, rules);
     check_effects(scene, rules);
     check_time(scene, limit, rules);
+    check_plausible(scene, rules);
     check_inside(scene, rules);
     // Filling asks for shapes that make sense.
     if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
         for (auto& issue : Filling::problems(scene)) rules.issues.push_back(std::move(issue));
-    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
-        for (auto& judgement : judge(scene, Filling(scene)))
+    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; })) {
+        const Filling filling(scene);
+        for (auto& judgement : judge(scene, filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
+        const double height = filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing;
+        if (scene.output.grain && *scene.output.grain > height)
+            rules.warning("output.grain",
+                          text("no column of soil is {:.4g} m high, all of it {:.4g} m: fronts in history.csv will be empty",
+                               *scene.output.grain, height));
+    }
     return rules.issues;
 }
 

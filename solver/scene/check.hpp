@@ -7,10 +7,11 @@
 
 namespace kuzure::scene {
 
-/// Largest dt c_p/h that the leap-frog survives; above it a run is refused unless the user insists.
-inline constexpr double unstable_courant = 0.8;
-/// Largest dt c_p/h that leaves the margin which impacts and disorder need; above it a warning is given.
-inline constexpr double recommended_courant = 0.4;
+/// Above this dt c_p/h nearly every run fails (docs/stability.md, the map of stable steps); it is refused unless the user
+/// insists.
+inline constexpr double unstable_courant = 0.6;
+/// Up to this dt c_p/h columns and collapses with viscosity kept their energy with every kernel; above it a warning.
+inline constexpr double recommended_courant = 0.3;
 
 /// min over soils of h/c_p (s): a Courant number of one.
 double crossing_time(const Scene&);

@@ -69,8 +69,8 @@ std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, dou
     } else {
         const auto& points = std::get<Polygon>(shape).points;
         for (std::size_t k = 0; k < points.size(); ++k) {
-            const auto [ax, az] = points[k];
-            const auto [bx, bz] = points[(k + 1) % points.size()];
+            const auto &a = points[k], &b = points[(k + 1) % points.size()];
+            const double ax = a[0], az = a[1], bx = b[0], bz = b[1]; // no bindings: clang 14 keeps them out of lambdas
             if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin) continue;
             // The part of the edge within margin of the row's height.
             const auto x_at = [&](double height) {
@@ -321,8 +321,10 @@ Issues Filling::problems(const Scene& scene)
                                           scene.space.spacing),
                               {}});
     }
+    // One mistake may make every shape overlap every other: nobody reads a million lines, nor waits for them.
+    const std::size_t enough = 100;
     for (std::size_t i = 0; i < pieces.size(); ++i)
-        for (std::size_t j = i + 1; j < pieces.size(); ++j) {
+        for (std::size_t j = i + 1; j < pieces.size() && issues.size() < enough; ++j) {
             const auto &a = pieces[i], &b = pieces[j];
             if (!a.lattice || !b.lattice) continue;
             const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);

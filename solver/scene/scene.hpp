@@ -137,7 +137,7 @@ enum class Precision { Double, Mixed };
 enum class Correction { None, Gradient };
 
 struct Accuracy {
-    Kernel kernel = Kernel::CubicSpline;
+    Kernel kernel = Kernel::WendlandC2;
     double cfl = 0.2;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;

@@ -1,12 +1,10 @@
 // kuzure check: what will be simulated and why, counts, step, memory, disk. Runs nothing.
 #include "solver/scene/check.hpp"
-#include "io/checkpoint.hpp"
-#include "io/snapshot.hpp"
 #include "io/summary.hpp"
 #include "solver/app/command.hpp"
+#include "solver/app/estimate.hpp"
 #include "solver/app/simulation.hpp"
 #include "solver/kernels/step.hpp"
-#include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -35,41 +33,8 @@ double measure_pair(const Comm& comm, Scene s)
     return (omp_get_wtime() - begin) / double(std::max<std::int64_t>(1, sim.pairs() - pairs));
 }
 
-struct Estimate {
-    std::int64_t soil, walls, steps;
-    double dt, memory, disk, seconds;
-};
-
-Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& model, double seconds_per_pair)
-{
-    Estimate e{};
-    e.soil = f.soil_count(), e.walls = f.wall_count();
-    double c = 0;
-    for (const auto& soil : s.soils) c = std::max(c, Material::from(soil).sound_speed);
-    const double h = s.smoothing_length();
-    const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
-    // A collapse moves at about sqrt(g H): the signal speed that shortens a step which follows the motion.
-    const double fall = std::sqrt(g * (f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing));
-    e.dt = s.time.step ? *s.time.step : s.accuracy.cfl * h / (c + 0.25 * fall);
-    e.steps = std::int64_t(std::llround(s.time.end / e.dt));
-
-    const double pi = 3.14159265358979, k = 2 * s.space.h;
-    const double neighbours = s.dimensions == 3 ? 4 * pi / 3 * k * k * k : pi * k * k;
-    const bool mixed = model.precision() == scene::Precision::Mixed;
-    const double records = 2.0 * (mixed ? 64 : 128) * (model.tensile() ? 1.5 : 1.0);
-    const double skin = std::pow(1 + s.accuracy.skin, 3);
-    const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
-    e.memory = scene::column_bytes(f) + double(e.soil) * (records + list + 24) + 60.0 * double(e.walls) + 60e6;
-    const double snapshots = s.output.every ? std::floor(s.time.end / *s.output.every) + 2 : 2;
-    e.disk = snapshots * double(io::snapshot_bytes(e.soil + e.walls, s.output.fields)) +
-             2.0 * double(io::checkpoint_bytes(e.soil, std::size_t(scene::column_bytes(f) / std::max<double>(1, double(e.soil))))) +
-             (s.output.history ? s.time.end / *s.output.history * 320 : 0);
-    // lists, sorting and output took 9 % on top of the pass in hirata_52 (docs/performance.md)
-    e.seconds = double(e.steps) * double(e.soil) * neighbours * 0.95 * seconds_per_pair * 1.09;
-    return e;
-}
-
-std::string bytes_text(double b) { return b > 1e9 ? fmt::format("{:.1f} GB", b * 1e-9) : fmt::format("{:.0f} MB", b * 1e-6); }
+/// As JSON has whole numbers.
+std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
 
 } // namespace
 
@@ -95,10 +60,16 @@ void add_check(CLI::App& app, Action& chosen)
             const Scene s = args->read(comm);
             const scene::Filling filling(s);
             const auto model = choose_model(s, Arithmetic::Lanes);
-            const Estimate e = estimate(s, filling, *model, measure_pair(comm, s));
+            const Estimate e = estimate(s, filling, *model);
+            const double memory = e.memory + bytes_per_process * comm.size();
+            // lists, sorting and output took 9 % on top of the pass in hirata_52 (docs/performance.md)
+            const double seconds = e.pairs * measure_pair(comm, s) * 1.09;
             std::vector<std::string> warnings;
             for (const auto& issue : scene::check(s, args->force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
                 warnings.push_back(issue.key + ": " + issue.text);
+            const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
+            if (const auto why = does_not_fit(comm, e, where); !why.empty())
+                warnings.push_back("on this machine kuzure run would refuse this scene: " + why);
             if (comm.rank() != 0) return Exit::Ok;
             const auto judgements = scene::judge(s, filling);
             if (*json) {
@@ -108,9 +79,9 @@ void add_check(CLI::App& app, Action& chosen)
                                          {"wall_particles", e.walls},
                                          {"dt", e.dt},
                                          {"steps", e.steps},
-                                         {"memory_bytes", std::int64_t(e.memory)},
-                                         {"disk_bytes", std::int64_t(e.disk)},
-                                         {"predicted_seconds", e.seconds},
+                                         {"memory_bytes", whole(memory)},
+                                         {"disk_bytes", whole(e.disk())},
+                                         {"predicted_seconds", seconds},
                                          {"effects", io::effects_json(s.notes)},
                                          {"numbers", numbers},
                                          {"warnings", warnings}};
@@ -122,8 +93,8 @@ void add_check(CLI::App& app, Action& chosen)
             fmt::print("  step        {:.3g} s{}, {}{} steps to {:g} s\n", e.dt, s.time.step ? " (fixed)" : " (follows the motion)",
                        s.time.step ? "" : "about ", e.steps, s.time.end);
             fmt::print("  pair model  {}\n", model->name());
-            fmt::print("  memory      {} in all, disk {}\n", bytes_text(e.memory), bytes_text(e.disk));
-            fmt::print("  time        about {:.1f} minutes on this machine\n\n", e.seconds / 60);
+            fmt::print("  memory      {} in all, disk {}\n", bytes_text(memory), bytes_text(e.disk()));
+            fmt::print("  time        about {:.1f} minutes on this machine\n\n", seconds / 60);
             for (const auto& n : s.notes) fmt::print("  {:<4}{}: {}\n", n.on ? "on" : "off", n.name, n.why);
             fmt::print("\n");
             for (const auto& n : judgements) fmt::print("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);

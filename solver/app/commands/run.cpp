@@ -7,6 +7,7 @@
 #include "io/summary.hpp"
 #include "perf/report.hpp"
 #include "solver/app/command.hpp"
+#include "solver/app/estimate.hpp"
 #include "solver/app/measure.hpp"
 #include "solver/app/simulation.hpp"
 #include "solver/core/simd.hpp"
@@ -28,7 +29,7 @@ struct Arguments {
     std::optional<std::string> restart; // empty: the newest good checkpoint
     int threads = 0;
     double max_minutes = 0;
-    bool force = false, quiet = false, plain = false;
+    bool force = false, force_size = false, quiet = false, plain = false;
     int recut_every = 0;
 };
 
@@ -162,6 +163,7 @@ private:
                             "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
                             from->file.string(), from->scene_hash, hash_));
         const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every, 50};
+        fits_or_throw(where, from ? clock_from(from->header, from->file).time / scene_.time.end : 0);
         std::optional<double> restart_time;
         if (from) {
             Particles p;
@@ -190,6 +192,16 @@ private:
         history_.emplace(comm_, dir_->history(), scene_.dimensions, restart_time);
         say(fmt::format("{}: {} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title, sim_->filling().soil_count(),
                         sim_->filling().wall_count(), comm_.size(), threads_, sim_->model().name()));
+    }
+
+    /// Before anything is allocated or written: a run that must end with full memory or a full disk does not begin.
+    void fits_or_throw(const io::Path& where, double done) const
+    {
+        const auto model = choose_model(scene_, args_.plain ? Arithmetic::Plain : Arithmetic::Lanes);
+        const auto why = does_not_fit(comm_, estimate(scene_, scene::Filling(scene_), *model), where, std::clamp(done, 0.0, 1.0));
+        if (why.empty()) return;
+        if (!args_.force_size) throw BadInput(fmt::format("{}: this run does not fit: {}; or --force-size to try", args_.scene.file, why));
+        if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}; going on as told by --force-size\n", why);
     }
 
     /// True if something that comes every `interval` s is due at this step and was not there at the one before.
@@ -367,8 +379,10 @@ private:
             }
             throw NumbersFailed(text);
         } catch (const IoFailed& e) {
-            throw IoFailed(std::string(e.what()) + (checkpoint_.empty() ? ". No checkpoint had been written"
-                                                                        : ". The last good checkpoint is " + checkpoint_.string()));
+            std::string text = e.what(); // a checkpoint that failed says itself which one is good
+            if (text.find("The last good checkpoint is") == text.npos)
+                text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
+            throw IoFailed(text);
         }
         write_summary("finished", Exit::Ok);
         progress.show(sim, residual_, true);
@@ -415,6 +429,7 @@ void add_run(CLI::App& app, Action& chosen)
         ->check(CLI::PositiveNumber);
     command->add_flag("--quiet", a->quiet, "print nothing but errors");
     command->add_flag("--force", a->force, "move an existing result directory aside");
+    command->add_flag("--force-size", a->force_size, "start although memory or disk will not be enough by kuzure's estimate");
     command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");
     command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
     command->callback([=, &chosen] {

@@ -1,0 +1,40 @@
+#pragma once
+// What a run will need, known before anything is allocated or written, and whether this machine has it.
+#include "decomposition/comm.hpp"
+#include "io/file.hpp"
+#include "solver/kernels/step.hpp"
+#include "solver/scene/fill.hpp"
+#include <string>
+
+namespace kuzure {
+
+struct Estimate {
+    std::int64_t soil, walls, steps;
+    double dt;         // s
+    double memory;     // bytes of all ranks together, but for what every process takes to begin with
+    double snapshot;   // bytes of one
+    double checkpoint; // bytes of one
+    double snapshots;  // how many
+    double history;    // bytes
+    double pairs;      // directed pairs of all steps
+
+    /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
+    double disk() const { return snapshots * snapshot + 3 * checkpoint + history; }
+};
+Estimate estimate(const Scene&, const scene::Filling&, const PairModel&);
+
+/// Bytes that every process takes before its first particle: MPI, HDF5, the program.
+inline constexpr double bytes_per_process = 60e6;
+
+/// Bytes that the processes of this machine may have together: what is installed, or less where a container or a job is
+/// limited to less.
+double machine_memory();
+
+/// "1.2 GB"
+std::string bytes_text(double bytes);
+
+/// Why the run cannot fit into the memory of its machines or on the disk of `directory`, with the numbers and the remedy, or
+/// empty. `done` is the share of the run that lies behind a restart. Collective; the same on all ranks.
+std::string does_not_fit(const Comm&, const Estimate&, const io::Path& directory, double done = 0);
+
+} // namespace kuzure

@@ -1,0 +1,92 @@
+"""kill -9 at random moments, resumed by --restart until the run ends: it must end with the bits of the undisturbed run."""
+import os, random, re, signal, time
+
+from faults import Place, check, kill, same_results, scene_text, wait_for
+
+# What is killed. "machine" is all processes at once, as when a node goes down under them.
+VICTIMS = ("one rank", "mpirun", "machine", "program without mpirun")
+
+
+def campaign(kills, seed, kills_a_run=5):
+    """A record of what was tried and what came of it."""
+    rng = random.Random(seed)
+    record = {"seed": seed, "kills": 0, "by_victim": {v: 0 for v in VICTIMS}, "during_a_checkpoint_write": 0, "between_two_renames": 0,
+              "before_the_first_checkpoint": 0, "runs": 0, "runs_with_the_bits_of_the_undisturbed_one": 0, "resumed_from_previous": 0}
+    with Place("kills") as place:
+        # So short an interval that a checkpoint is written at nearly every step.
+        scene = place.write("scene.toml", scene_text(end=0.03, checkpoint=1e-6))
+        place.run(place.write("calm.toml", scene_text(end=0.03)), "calm")
+        record["state_hash"] = place.summary("calm")["state_hash"]
+        while record["kills"] < kills:
+            out = f"run{record['runs']}"
+            target = min(kills_a_run, kills - record["kills"])
+            done = 0
+            while done < target:
+                if kill_once(place, scene, out, rng, record):
+                    done += 1
+                elif os.path.exists(place(out, "summary.json")) and place.summary(out)["status"] == "finished":
+                    break  # it was quicker than the kill
+            record["runs"] += 1
+            ranks = rng.choice((1, 2, 3))
+            place.run(scene, out, "--restart", ranks=ranks)
+            if same_results(place, out, "calm", f"run {record['runs']}, after {done} kills, ended on {ranks} ranks"):
+                record["runs_with_the_bits_of_the_undisturbed_one"] += 1
+        if record["runs"] and kills >= 10:
+            check(record["during_a_checkpoint_write"] > 0, f"{record['during_a_checkpoint_write']} kills fell into a checkpoint write")
+    return record
+
+
+def kill_once(place, scene, out, rng, record):
+    victim = rng.choice(VICTIMS)
+    ranks = 1 if victim == "program without mpirun" else rng.choice((2, 3))
+    had = os.path.exists(place(out, "checkpoint.h5")) or os.path.exists(place(out, "checkpoint.prev.h5"))
+    process = place.start(scene, out, "--restart", ranks=ranks)
+    temporary = place(out, "checkpoint.h5.tmp")
+    if rng.random() < 0.25:
+        time.sleep(rng.uniform(0.05, 1.0))  # any moment, MPI's start and the reading of the checkpoint among them
+    else:
+        begun = os.stat(place(out, "checkpoint.h5")).st_mtime_ns if had and os.path.exists(place(out, "checkpoint.h5")) else 0
+        # From the first new checkpoint on.
+        wait_for(lambda: process.poll() is not None
+                 or (os.path.exists(place(out, "checkpoint.h5")) and changed(place(out, "checkpoint.h5"), begun)), 60)
+        time.sleep(rng.uniform(0, 0.6))
+        if rng.random() < 0.5:
+            wait_for(lambda: process.poll() is not None or os.path.exists(temporary), 5, every=0.0002)
+    everyone = place.processes(out)
+    chosen = [pid for pid, is_rank in everyone if is_rank or victim in ("mpirun", "machine")]
+    if victim == "mpirun":
+        chosen = [pid for pid, is_rank in everyone if not is_rank] or chosen
+    if victim == "one rank" and chosen:
+        chosen = [rng.choice(chosen)]
+    hit = [pid for pid in chosen if process.poll() is None and kill(pid, signal.SIGKILL)]
+    try:
+        process.wait(30)
+    except Exception:
+        process.kill()
+        check(False, f"{out}: mpirun did not end within 30 s of the kill of {victim}")
+    place.gone(out)
+    with open(place(out + ".said")) as f:
+        said = f.read()
+    if had:
+        check("no checkpoint in" not in said, f"{out}: with a checkpoint there it is never started from the beginning")
+    record["resumed_from_previous"] += len(re.findall("Going back to", said))
+    if not hit or process.returncode == 0:
+        check(process.returncode == 0 or bool(hit), f"{out}: ends by itself only when it is finished, exit {process.returncode} {said[-300:]}")
+        return False
+    record["kills"] += 1
+    record["by_victim"][victim] += 1
+    # What lies there tells where the kill fell.
+    if os.path.exists(temporary):
+        record["during_a_checkpoint_write"] += 1
+        if not os.path.exists(place(out, "checkpoint.h5")) and os.path.exists(place(out, "checkpoint.prev.h5")):
+            record["between_two_renames"] += 1
+    if not os.path.exists(place(out, "checkpoint.h5")) and not os.path.exists(place(out, "checkpoint.prev.h5")):
+        record["before_the_first_checkpoint"] += 1
+    return True
+
+
+def changed(path, since):
+    try:
+        return os.stat(path).st_mtime_ns != since
+    except FileNotFoundError:
+        return False

@@ -1,0 +1,158 @@
+// Any bytes are a checkpoint or a refusal in words. The first byte of the input chooses what the rest is:
+//   0  a whole file;
+//   1  changes of a good checkpoint: triples (offset, offset, value), with which most of the file's structures stand;
+//   2  the manifest of a file whose checksums are right, up to a zero byte, then the header: what lies behind them.
+// Built for libFuzzer (-DKUZURE_FUZZ=ON), and for the replay of the corpus in the normal suite (replay_test.cpp).
+#include "io/checkpoint.hpp"
+#include "io/hdf5.hpp"
+#include <bit>
+#include <cstdio>
+#include <cstdlib>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+using namespace kuzure;
+
+namespace {
+
+const Alone alone;
+
+[[noreturn]] void found(const char* what)
+{
+    std::fprintf(stderr, "checkpoint_fuzz: %s\n", what);
+    std::abort();
+}
+
+/// A directory in memory that goes with the program.
+struct Scratch {
+    io::Path path;
+    Scratch()
+    {
+        char shared[] = "/dev/shm/kuzure_fuzz_XXXXXX", plain[] = "/tmp/kuzure_fuzz_XXXXXX";
+        const char* made = mkdtemp(shared);
+        if (!made) made = mkdtemp(plain);
+        if (!made) found("no place for files");
+        path = made;
+    }
+    ~Scratch()
+    {
+        std::error_code ignored;
+        std::filesystem::remove_all(path, ignored);
+    }
+};
+
+Particles seven()
+{
+    Particles p;
+    p.require(field::velocity, field::stress, field::density, field::soil);
+    p.resize(7);
+    p.for_each_present([&](auto f) {
+        using T = typename decltype(f)::Number;
+        for (int c = 0; c < f.components; ++c)
+            for (Index i = 0; i < 7; ++i) p[f].column[c][i] = T(i + 10 * c);
+    });
+    return p;
+}
+
+void write(const io::Path& file, std::string_view bytes)
+{
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    if (fd < 0 || ::write(fd, bytes.data(), bytes.size()) != ssize_t(bytes.size())) found("the scratch file cannot be written");
+    ::close(fd);
+}
+
+std::uint64_t mix(std::uint64_t h)
+{
+    h = (h ^ (h >> 32)) * 0xd6e8feb86659fd93u;
+    h = (h ^ (h >> 32)) * 0xd6e8feb86659fd93u;
+    return h ^ (h >> 32);
+}
+/// The checksum of io/checkpoint.cpp for a text; where the two part, mode 2 only finds refusals, and the self-check says so.
+std::string checksum(std::string_view text)
+{
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < text.size(); ++i)
+        sum += mix((std::uint64_t(i) + 1) * 0x9e3779b97f4a7c15u ^ std::uint64_t(static_cast<unsigned char>(text[i])));
+    return fmt::format("{:016x}", mix(sum ^ text.size()));
+}
+
+/// A file with this manifest, its checksum right, over the tables of seven particles.
+void write_with_manifest(const io::Path& file, const std::string& manifest, const std::string& header)
+{
+    const auto bytes = [](const std::string& s) {
+        return std::span<const std::uint8_t>(reinterpret_cast<const std::uint8_t*>(s.data()), s.size());
+    };
+    const Particles p = seven();
+    io::H5Writer out(alone, file, 0);
+    out.group("/particles");
+    p.for_each_present([&](auto f) {
+        using T = typename decltype(f)::Number;
+        std::vector<T> rows;
+        for (Index i = 0; i < 7; ++i)
+            for (int c = 0; c < f.components; ++c) rows.push_back(p[f].column[c][i]);
+        out.table(fmt::format("/particles/{}", f.name), std::span<const T>(rows), f.components);
+    });
+    out.table("/header", bytes(header), 1);
+    out.table("/manifest", bytes(manifest), 1);
+    out.attribute("/manifest", "checksum", checksum(manifest));
+    out.publish();
+}
+
+/// What reading says: empty if the file is good.
+std::string refusal(const io::Path& file)
+{
+    try {
+        Particles p;
+        const auto c = io::read_checkpoint(alone, file, p);
+        if (p.size() != Index(c.particles)) found("another number of particles than the checkpoint says");
+        return {};
+    } catch (const IoFailed& e) {
+        const std::string message = e.what();
+        if (message.empty() || message.size() > 100000) found("a refusal of no words, or of too many");
+        return message;
+    }
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size)
+{
+    static const Scratch scratch;
+    static const std::string good = [] {
+        io::write_checkpoint(alone, scratch.path, seven(), "hash", "{\"time\": 0.5}");
+        const auto file = scratch.path / "checkpoint.h5";
+        if (!refusal(file).empty()) found("the good checkpoint is refused");
+        // The self-check of mode 2: with its own manifest again the file passes the checksum of the manifest.
+        std::vector<std::uint8_t> manifest;
+        const io::H5Reader in(file);
+        in.rows("/manifest", 0, in.table("/manifest").rows, 1, manifest);
+        const auto again = scratch.path / "again.h5";
+        write_with_manifest(again, {manifest.begin(), manifest.end()}, "{\"time\": 0.5}");
+        if (const auto why = refusal(again); !why.empty()) std::fprintf(stderr, "%s\n", why.c_str()), found("mode 2 makes no good file");
+        return io::read_text(file);
+    }();
+    if (size == 0 || size > (1 << 20)) return 0;
+    const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
+    const auto file = scratch.path / "input.h5";
+    switch (data[0] % 3) {
+    case 0:
+        write(file, rest);
+        break;
+    case 1: {
+        std::string changed = good;
+        for (std::size_t k = 0; k + 2 < rest.size(); k += 3) {
+            const auto byte = [&](std::size_t i) { return std::size_t(static_cast<unsigned char>(rest[k + i])); };
+            changed[(byte(0) * 256 + byte(1)) % changed.size()] = rest[k + 2];
+        }
+        write(file, changed);
+        break;
+    }
+    default: {
+        const auto end = rest.find('\0');
+        write_with_manifest(file, std::string(rest.substr(0, end)), end == rest.npos ? "" : std::string(rest.substr(end + 1)));
+    }
+    }
+    refusal(file);
+    return 0;
+}
