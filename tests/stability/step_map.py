@@ -136,7 +136,7 @@ if figures:
     for i, case in enumerate(CASES):
         lines = ", ".join(f"'{data}' index {i * len(KERNELS) + j} using 1:2 with linespoints pt 7 ps 0.8 lw 2 title '{k}, h {h}'"
                           for j, (k, h) in enumerate(KERNELS))
-        plots.append(f"set title '{case}'\nplot {lines}, 0.2 dt 2 lc 'black' title 'default accuracy.cfl', 0.4 dt 3 lc 'red' title 'warned of above'")
+        plots.append(f"set title '{case}'\nplot {lines}, 0.2 dt 2 lc 'black' title 'default accuracy.cfl', 0.3 dt 3 lc 'red' title 'warned of above', 0.6 dt 4 lc 'red' title 'refused above'")
     script = (f"set terminal pngcairo size 1200,420 font 'sans,10'\nset output '{figures}/step_map.png'\nset multiplot layout 1,3\n"
               "set xlabel 'artificial viscosity alpha'\nset ylabel 'largest stable dt c_p/h'\nset yrange [0:1.2]\nset xrange [-0.03:1.03]\n"
               "set key top right font ',8'\nset grid\n" + "\n".join(plots) + "\nunset multiplot\n")
