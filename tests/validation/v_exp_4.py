@@ -139,8 +139,8 @@ def main(quick=False, slow=False):
     case.within(f"factor of safety, cone {psi0}, H/dx 40", CHART, fine, "1", 3, seconds=sum(m["seconds"] for m in done),
                 note=f"drift from H/dx 20: {fine - fos[psi0]:+.4f}; slides more than 0.05 H at SRF {slides(done):.3f}", figure="v_exp_4_slope.png")
     # Hard case H13: a slope far from failure must not creep, whatever the kernel.
-    for label, changes in (("Wendland C2, h 1.5", {}), ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
-                           ("cubic spline, h 1.3 (the default)", {"space.h": 1.3, "accuracy.kernel": "cubic spline"}),
+    for label, changes in (("Wendland C2, h 1.5", {}), ("Wendland C2, h 1.3 (the default)", {"space.h": 1.3}), ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
+                           ("cubic spline, h 1.3", {"space.h": 1.3, "accuracy.kernel": "cubic spline"}),
                            ("cubic spline, h 1.5", {"accuracy.kernel": "cubic spline"})):
         m = at(1.0, psi0, 20, "-rest-" + label.split("(")[0].strip().replace(", ", "-").replace(" ", "-"), **changes)
         case.record(f"stable slope (SRF 1) at rest, {label}: displacement after {FREE:g} s", 0.0, m["end"], "m", "< 0.1 spacings, at rest at the end",
