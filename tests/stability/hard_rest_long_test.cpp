@@ -1,4 +1,4 @@
-// Hard cases in full size: a heap that rests for 100 sqrt(H/g) (H13), what of H17 is not softening.
+// A hard case in full size: a heap that rests for 100 sqrt(H/g) (H13).
 #include "tests/stability/heap.hpp"
 
 using namespace kuzure;

@@ -45,8 +45,7 @@ struct Disc {
     double stress_drift = 0, radius = 0; // worst over the turns
     Outcome outcome;
 };
-/// A disc that turns about y, in the stress of its centrifugal force and a stress of its own that is in balance: s (1 - r^2/R^2) along
-/// the radius, s (1 - 3 r^2/R^2) around it.
+/// A disc that turns about y, in the stress of its centrifugal force.
 Disc turn(double turns, const std::string& correction)
 {
     const double R = 0.5, omega = 2 * pi;
@@ -55,12 +54,12 @@ Disc turn(double turns, const std::string& correction)
     t.accuracy = fmt::format("kernel = \"wendland c2\"\ncorrection = \"{}\"", correction);
     t.effects = "viscosity = { alpha = 0.1, beta = 0.0 }";
     t.bodies = sphere({0, 0, 0}, R);
-    const double nu = t.k0(), load = t.density * omega * omega, own = 1e5;
+    const double nu = t.k0(), load = t.density * omega * omega;
     Simulation sim(Comm::world(), t.scene(), starting_with([&](Particles& p, Index i, Vector x) {
                        set_velocity(p, i, cross({0, omega, 0}, x));
                        const double r2 = x.x * x.x + x.z * x.z, r = std::sqrt(std::max(r2, 1e-30)), nx = x.x / r, nz = x.z / r;
-                       const double along = load / 8 * (3 + nu) * (R * R - r2) - own * (1 - r2 / (R * R));
-                       const double around = load / 8 * ((3 + nu) * R * R - (1 + 3 * nu) * r2) - own * (1 - 3 * r2 / (R * R));
+                       const double along = load / 8 * (3 + nu) * (R * R - r2);
+                       const double around = load / 8 * ((3 + nu) * R * R - (1 + 3 * nu) * r2);
                        set_stress(p, i,
                                   {along * nx * nx + around * nz * nz, t.poisson * (along + around), along * nz * nz + around * nx * nx, 0,
                                    0, (along - around) * nx * nz});
@@ -220,7 +219,7 @@ TEST(H11, TenTurnsOfAStressedDisc)
     const auto corrected = turn(10, "gradient");
     EXPECT_TRUE(corrected.outcome.held());
     EXPECT_TRUE(c.at_most("10 turns, correction: drift of the stress eigenvalues", corrected.stress_drift, "1", 0.01,
-                          {.note = "strain errors of 0.1 % a turn, not the rotation: Hughes-Winget keeps a rotated stress to round-off", .achieved = 2}));
+                          {.note = "about 0.5 % of Young's modulus in ten turns, as the radius; cause not found", .achieved = 2}));
     EXPECT_TRUE(c.at_most("10 turns, correction: change of radius", corrected.radius, "1", 0.01));
     const auto plain = turn(2, "none");
     EXPECT_FALSE(c.control_at_most("2 turns, no correction: change of radius", plain.radius, "1", 0.01));
