@@ -146,8 +146,9 @@ TEST(H7, CornerWedgeAndThinWall)
         auto& most = std::min(x.x, 1 - x.x) > 2 * t.spacing ? middle : worst;
         most = std::max(most, std::fabs(stress(sim, i).zz / (-t.density * gravity * (1 - x.z)) - 1));
     });
-    EXPECT_TRUE(c.at_most("error of sigma_zz in the corners of a smooth tank", worst, "1", 0.1,
-                          {.note = "7 % on the floor away from the corners; probably there is no mirror image for the corner itself", .achieved = 0.15}));
+    EXPECT_TRUE(c.at_most(
+        "error of sigma_zz in the corners of a smooth tank", worst, "1", 0.1,
+        {.note = "7 % on the floor away from the corners; probably there is no mirror image for the corner itself", .achieved = 0.15}));
     c.report("error of sigma_zz on the floor of a smooth tank away from its corners", middle, "1");
     const auto broken = retained(1, 8);
     EXPECT_FALSE(c.control("soil thrown at a wall of 1 layer, four times as fast: depth in it", broken.depth, "dx", "<= 0.5, none outside",
@@ -164,8 +165,9 @@ TEST(H8, TallColumns)
         EXPECT_TRUE(r[k].outcome.held());
         EXPECT_TRUE(c.at_most(fmt::format("a = {}: lost particles", a), r[k].lost, "1", 0));
         EXPECT_TRUE(c.at_most(fmt::format("a = {}: energy residual", a), r[k].energy, "1", 0.02));
-        c.report(fmt::format("a = {}: run-out over the half width", a), r[k].runout, "1",
-                 fmt::format("Lube 2005 1.9 a^(2/3) = {:.3g}, Lajeunesse 2005 {:.3g}", 1.9 * std::pow(a, 2.0 / 3), 2.3 * std::pow(a, 2.0 / 3)));
+        c.report(
+            fmt::format("a = {}: run-out over the half width", a), r[k].runout, "1",
+            fmt::format("Lube 2005 1.9 a^(2/3) = {:.3g}, Lajeunesse 2005 {:.3g}", 1.9 * std::pow(a, 2.0 / 3), 2.3 * std::pow(a, 2.0 / 3)));
     }
     EXPECT_TRUE(c.near("exponent of the run-out, a = 10 and 20", 2.0 / 3, std::log2(r[1].runout / r[0].runout), "1", 0.2,
                        {.note = "half width of 5 dx; front of loose grains, constant friction of 24 deg", .achieved = 0.35}));
@@ -189,7 +191,8 @@ TEST(H9, ThinLayerOnAnIncline)
         if (rows >= 4) EXPECT_TRUE(c.near(coulomb, 1, slid, "1", 0.1));
         else c.report(coulomb, slid, "1");
     }
-    EXPECT_FALSE(c.control("ground of 18 deg taken for 15: speed", 1, layer(4, "surface = { friction_angle = 18.0 }", std::tan(15 * pi / 180), 30), "1", 0.1));
+    EXPECT_FALSE(c.control("ground of 18 deg taken for 15: speed", 1,
+                           layer(4, "surface = { friction_angle = 18.0 }", std::tan(15 * pi / 180), 30), "1", 0.1));
 }
 
 TEST(H13, HeapAtRest)
@@ -207,7 +210,8 @@ TEST(H13, HeapAtRest)
         c.report(name + "drift of the last quarter over that of the first", r.late / r.early, "1");
     }
     const auto steep = heap(0.04, 0.9, 20, "cubic spline", 1.2);
-    EXPECT_FALSE(c.control("factor of safety 0.9: drift", steep.drift, "dx", "<= 0.1, KE/PE0 <= 1e-8", steep.drift <= 0.1 && steep.kinetic <= 1e-8));
+    EXPECT_FALSE(
+        c.control("factor of safety 0.9: drift", steep.drift, "dx", "<= 0.1, KE/PE0 <= 1e-8", steep.drift <= 0.1 && steep.kinetic <= 1e-8));
 }
 
 TEST(H17, SofteningAndSpacing)
@@ -224,5 +228,4 @@ TEST(H17, SofteningAndSpacing)
         const double wrong = softened(0.025, slip / 2);
         c.control(fmt::format("slip {} m, proportional to dx: run-out with dx/2 over that with dx", slip), 1, wrong / coarse, "1", 0.1);
     }
-    c.report("no softening (slip of 1 km): run-out with dx/2 over that with dx", softened(0.025, 1000) / softened(0.05, 1000), "1");
 }

