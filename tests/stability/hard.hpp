@@ -99,7 +99,8 @@ template <class F> double noise(const Simulation& s, F f, double scale)
 inline double noise_of_sigma_zz(const Simulation& s)
 {
     const double scale = s.soils()[0].density * gravity * s.scene().space.spacing;
-    return noise(s, [&](Index i) { return stress(s, i).zz; }, scale);
+    return noise(
+        s, [&](Index i) { return stress(s, i).zz; }, scale);
 }
 
 /// Front: the mean x of the farthest per cent of particles; and the highest particle.

@@ -80,7 +80,8 @@ Column column(double poisson, const std::string& effects, double jitter, const c
         zz.add(s.zz, expected), p.add(trace(s) / 3, (1 + 2 * k0) / 3 * expected);
     });
     c.p = p.L2(), c.zz = zz.L2();
-    c.noise = noise(sim, [&](Index i) { return trace(stress(sim, i)) / 3; }, t.density * gravity * t.spacing);
+    c.noise = noise(
+        sim, [&](Index i) { return trace(stress(sim, i)) / 3; }, t.density * gravity * t.spacing);
     return c;
 }
 
@@ -90,8 +91,10 @@ TEST(H2, NoiseOfTheStress)
 {
     Case c("H2");
     const auto with = collapse_noise(diffusion), without = collapse_noise("");
-    EXPECT_TRUE(c.at_most("collapse, zeta = 0.1: N of sigma_zz while it flows", with.flowing, "1", 0.10, {.note = "2.5 times less than without", .achieved = 0.25}));
-    EXPECT_TRUE(c.at_most("collapse, zeta = 0.1: N of sigma_zz at rest", with.resting, "1", 0.02, {.note = "10 times less than without", .achieved = 0.04}));
+    EXPECT_TRUE(c.at_most("collapse, zeta = 0.1: N of sigma_zz while it flows", with.flowing, "1", 0.10,
+                          {.note = "2.5 times less than without", .achieved = 0.25}));
+    EXPECT_TRUE(c.at_most("collapse, zeta = 0.1: N of sigma_zz at rest", with.resting, "1", 0.02,
+                          {.note = "10 times less than without", .achieved = 0.04}));
     double apart = 0, worst = 0;
     int count = 0;
     for (const auto& [strip, z] : with.profile)
@@ -112,8 +115,8 @@ TEST(H5, NearlyIncompressibleColumn)
     EXPECT_TRUE(c.at_most("column, nu = 0.49: L2 error of the mean stress", cured.p, "1", 0.05));
     EXPECT_TRUE(c.at_most("column, nu = 0.49: N of the mean stress", cured.noise, "1", 0.05));
     const auto bare = column(0.49, "", 0, "none", 30);
-    EXPECT_FALSE(c.control("column, nu = 0.49, neither damping nor viscosity: L2 error of the mean stress", bare.p, "1", "<= 0.05, N <= 0.05",
-                           bare.p <= 0.05 && bare.noise <= 0.05));
+    EXPECT_FALSE(c.control("column, nu = 0.49, neither damping nor viscosity: L2 error of the mean stress", bare.p, "1",
+                           "<= 0.05, N <= 0.05", bare.p <= 0.05 && bare.noise <= 0.05));
 }
 
 TEST(H15, IrregularStart)
@@ -122,13 +125,17 @@ TEST(H15, IrregularStart)
     const std::string unequal = "all particles have the same mass and volume: sum of V grad W is not zero; the cure (volumes of a Voronoi "
                                 "cell, relaxed start) is not in the solver";
     const auto rest = column(0.3, mild, 0.3, "at rest", 3);
-    EXPECT_TRUE(c.at_most("jitter 0.3 dx, stress at rest: greatest kinetic over potential energy", rest.kinetic, "1", 1e-4, {.note = unequal, .achieved = 3e-4}));
-    EXPECT_TRUE(c.at_most("jitter 0.3 dx, stress at rest: L2 error of sigma_zz after 3 H/c_p", rest.zz, "1", 0.05, {.note = unequal, .achieved = 1.5}));
+    EXPECT_TRUE(c.at_most("jitter 0.3 dx, stress at rest: greatest kinetic over potential energy", rest.kinetic, "1", 1e-4,
+                          {.note = unequal, .achieved = 3e-4}));
+    EXPECT_TRUE(c.at_most("jitter 0.3 dx, stress at rest: L2 error of sigma_zz after 3 H/c_p", rest.zz, "1", 0.05,
+                          {.note = unequal, .achieved = 1.5}));
     const auto settled = column(0.3, settling + mild, 0.3, "at rest", 30);
     c.report("jitter 0.3 dx, settled: L2 error of sigma_zz", settled.zz, "1");
-    c.report("jitter 0.3 dx, settled with stress diffusion: L2 error of sigma_zz", column(0.3, settling + mild + diffusion, 0.3, "at rest", 30).zz, "1");
+    c.report("jitter 0.3 dx, settled with stress diffusion: L2 error of sigma_zz",
+             column(0.3, settling + mild + diffusion, 0.3, "at rest", 30).zz, "1");
     const auto shocked = column(0.3, mild, 0.3, "none", 3);
-    EXPECT_FALSE(c.control_at_most("jitter 0.3 dx, no stress at the start: greatest kinetic over potential energy", shocked.kinetic, "1", 1e-4));
+    EXPECT_FALSE(
+        c.control_at_most("jitter 0.3 dx, no stress at the start: greatest kinetic over potential energy", shocked.kinetic, "1", 1e-4));
 }
 
 TEST(H16, LayersOfStiffnessAndDensity)
@@ -167,8 +174,9 @@ TEST(H16, LayersOfStiffnessAndDensity)
         const double below = 1.5 * row[1] - 0.5 * row[0], above = 1.5 * row[2] - 0.5 * row[3];
         EXPECT_TRUE(c.at_most(fmt::format("E 1:{}, density 1:2: jump of sigma_zz at the interface over its value", ratio),
                               std::fabs(above - below) / load, "1", 0.02, {.note = kink, .achieved = 0.15}));
-        EXPECT_TRUE(c.at_most(fmt::format("E 1:{}, density 1:2: worst error of sigma_zz within 2 dx of the interface over that at it", ratio),
-                              worst, "1", 0.02, {.note = kink, .achieved = 0.07}));
+        EXPECT_TRUE(
+            c.at_most(fmt::format("E 1:{}, density 1:2: worst error of sigma_zz within 2 dx of the interface over that at it", ratio),
+                      worst, "1", 0.02, {.note = kink, .achieved = 0.07}));
         c.curve(fmt::format("ratio_{}", ratio), {"z", "sigma_zz", "exact"}, rows);
         // Negative control: the form sigma_i/rho_i^2 + sigma_j/rho_j^2 under one uniform stress that both layers bear at the interface:
         // no force should act there. Measured as the acceleration it gives over g, next to the one of (sigma_i + sigma_j)/(rho_i rho_j).
@@ -183,7 +191,8 @@ TEST(H16, LayersOfStiffnessAndDensity)
                 const double r = length(d), q = r / h;
                 if (q >= 2 || r == 0) return;
                 const double slope = (q < 1 ? -3 * q + 2.25 * q * q : -0.75 * (2 - q) * (2 - q)) * 10 / (7 * pi * h * h * h);
-                const double gz = slope * d.z / r, ri = x.z > 0.5 ? 1000 : 2000, rj = origin(sim, j).z > 0.5 ? 1000 : 2000, m = rj * dx * dx;
+                const double gz = slope * d.z / r, ri = x.z > 0.5 ? 1000 : 2000, rj = origin(sim, j).z > 0.5 ? 1000 : 2000,
+                             m = rj * dx * dx;
                 a += m * 2 * load / (ri * rj) * gz, b += m * load * (1 / (ri * ri) + 1 / (rj * rj)) * gz;
             });
             adjoint = std::max(adjoint, std::fabs(a) / gravity), textbook = std::max(textbook, std::fabs(b) / gravity);

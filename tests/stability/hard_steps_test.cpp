@@ -128,9 +128,8 @@ Impact impact(double alpha, double beta, double mach = 0.3)
     t.effects += weight;
     Simulation sim(Comm::world(), t.scene());
     Impact r;
-    r.outcome = watch(sim, r.energy, [&](const Simulation& s) {
-        each(s, [&](Index i) { r.depth = std::max(r.depth, -position(s, i).z / t.spacing); });
-    });
+    r.outcome = watch(sim, r.energy,
+                      [&](const Simulation& s) { each(s, [&](Index i) { r.depth = std::max(r.depth, -position(s, i).z / t.spacing); }); });
     r.lost = lost(sim, {-2, 0, -0.02}, {2.4, 0, 3});
     return r;
 }
@@ -153,7 +152,8 @@ TEST(H6, LongStepsAreStableOrDetected)
         rows.push_back({courant, double(o.held()), worst});
         if (courant <= 0.4) {
             EXPECT_TRUE(o.held());
-            EXPECT_TRUE(c.at_most(fmt::format("collapse, dt c_p/h = {}: energy residual over the largest energy", courant), worst, "1", 0.02));
+            EXPECT_TRUE(
+                c.at_most(fmt::format("collapse, dt c_p/h = {}: energy residual over the largest energy", courant), worst, "1", 0.02));
         } else if (courant < 0.7) {
             c.report(fmt::format("collapse, dt c_p/h = {}: energy residual over the largest energy", courant), worst, "1",
                      o.held() ? "ran to its end" : "detected");
@@ -235,11 +235,12 @@ TEST(H12, CheckerboardDies)
     };
     for (const Kernel& k : {Kernel{"cubic spline", 1.2}, Kernel{"cubic spline", 1.3}, Kernel{"wendland c2", 1.5}})
         for (const double alpha : {0.05, 0.1})
-            EXPECT_TRUE(c.at_most(fmt::format("checkerboard energy left after 20 dx/c_p, {} h {}, alpha = {}", k.name, k.h, alpha),
-                                  checkerboard(alpha, k.name, k.h), "1", 0.1,
-                                  {.note = "the decay rate is proportional to alpha: 0.12 would do", .achieved = alpha < 0.1 ? 0.4 : 0.13}));
-    EXPECT_TRUE(c.at_most("checkerboard energy left after 20 dx/c_p, cubic spline h 1.2, alpha = 0.2", checkerboard(0.2, "cubic spline", 1.2), "1",
-                          0.1));
+            EXPECT_TRUE(
+                c.at_most(fmt::format("checkerboard energy left after 20 dx/c_p, {} h {}, alpha = {}", k.name, k.h, alpha),
+                          checkerboard(alpha, k.name, k.h), "1", 0.1,
+                          {.note = "the decay rate is proportional to alpha: 0.12 would do", .achieved = alpha < 0.1 ? 0.4 : 0.13}));
+    EXPECT_TRUE(c.at_most("checkerboard energy left after 20 dx/c_p, cubic spline h 1.2, alpha = 0.2",
+                          checkerboard(0.2, "cubic spline", 1.2), "1", 0.1));
     EXPECT_FALSE(c.control_at_most("checkerboard energy left after 20 dx/c_p, alpha = 0", checkerboard(0, "cubic spline", 1.2), "1", 0.1));
 }
 
@@ -266,8 +267,8 @@ TEST(H18, MapCoordinates)
         for (const auto& [id, d] : here) {
             worst = std::max(worst, length(there.at(id) - d)), largest = std::max(largest, length(d));
         }
-        EXPECT_TRUE(c.at_most(fmt::format("dx = {:.6g} m, shifted by 5e6 m: change of displacement over the largest", spacing), worst / largest,
-                              "1", 1e-6,
+        EXPECT_TRUE(c.at_most(fmt::format("dx = {:.6g} m, shifted by 5e6 m: change of displacement over the largest", spacing),
+                              worst / largest, "1", 1e-6,
                               {.note = "positions are kept as 8-byte coordinates of the map, 9.3e-10 m apart at 5e6 m", .achieved = 1e-4}));
     }
     // Negative control: single-precision coordinates.
@@ -288,7 +289,8 @@ TEST(H20, ResumedRunsAreTheSameBits)
             const Index j = at.at(a.particles()[field::id][i]);
             const Vector x = position(a, i), y = position(b, j), u = velocity(a, i), v = velocity(b, j);
             const Stress s = stress(a, i), r = stress(b, j);
-            count += !(x.x == y.x && x.z == y.z && u.x == v.x && u.z == v.z && s.xx == r.xx && s.yy == r.yy && s.zz == r.zz && s.xz == r.xz);
+            count +=
+                !(x.x == y.x && x.z == y.z && u.x == v.x && u.z == v.z && s.xx == r.xx && s.yy == r.yy && s.zz == r.zz && s.xz == r.xz);
         });
         return count;
     };

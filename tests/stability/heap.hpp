@@ -6,8 +6,9 @@
 namespace kuzure::validation {
 
 struct Rest {
-    double drift = 0, kinetic = 0, early = 0, late = 0; // D in dx; greatest KE/PE_0 of the last quarter; creep of the first and last quarter, dx
-    double calm = 0;                                    // KE/PE_0 at the end
+    double drift = 0, kinetic = 0, early = 0,
+           late = 0; // D in dx; greatest KE/PE_0 of the last quarter; creep of the first and last quarter, dx
+    double calm = 0; // KE/PE_0 at the end
 };
 /// A heap with a factor of safety `fos`, settled with damping for 10 sqrt(H/g), then watched for `times` sqrt(H/g).
 inline Rest heap(double spacing, double fos, double times, const std::string& kernel, double h, const std::string& more = mild)
