@@ -118,7 +118,7 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
     constexpr int batch = 16, room = 256;
     const V support(T(2 * model.kernel.h)), support2(T(4 * model.kernel.h * model.kernel.h));
     const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0));
-    struct alignas(64) Terms {
+    struct Terms {
         Vec3<V> grad, v, r;
         V pressure, close, q, along;
     };

@@ -23,7 +23,8 @@ namespace {
 using Narrow = Native<float>;
 constexpr int narrow = width<Narrow>;
 
-/// Candidates in single precision, relative to a local origin, padded so that a full register may be read anywhere.
+/// Candidates in single precision, relative to a local origin, padded so that a full register may be read anywhere; the padding is far
+/// away, and its square still a float.
 struct Candidates {
     Array<float> x, y, z;
     Array<Index> record;
@@ -33,7 +34,7 @@ struct Candidates {
     void resize(Index n)
     {
         x.resize(n + narrow), y.resize(n + narrow), z.resize(n + narrow), record.resize(n + narrow);
-        for (Index k = n; k < n + narrow; ++k) x[k] = y[k] = z[k] = 1e30f, record[k] = 0;
+        for (Index k = n; k < n + narrow; ++k) x[k] = y[k] = z[k] = 1e18f, record[k] = 0;
     }
     std::pair<Index, Index> range(std::int32_t cx, std::int32_t cy) const
     {

@@ -39,8 +39,7 @@ std::vector<Judgement> judge(const Scene& s, const Filling& f)
         add("mach", speed / slowest, "sqrt(2 g H)/c_p or the fastest body's; below 0.1 the P-wave's speed does not show, above 0.3 it does",
             speed / slowest > 0.3,
             fmt::format("the soil may move at {:.2f} of its P-wave speed: raise young, or read impacts with care", speed / slowest));
-    add("layers", height / dx, "H/spacing, layers of particles over the height; 20 and more for profiles, 50 for stresses",
-        height / dx < 8,
+    add("layers", height / dx, "H/spacing, layers of particles over the height; 20 and more for profiles, 50 for stresses", height / dx < 8,
         fmt::format("{:.0f} layers of particles are too few for profiles and stresses; 20 and more are for that", height / dx));
     const double dt = s.time.step.value_or(s.accuracy.cfl * crossing_time(s));
     add("courant", dt / crossing_time(s), fmt::format("dt c_p/h, step against the P-wave; recommended up to {}", recommended_courant),

@@ -65,7 +65,8 @@ inline Swing swing(Case& c, int across, double throw_speed, double periods, doub
     if (const auto& at = tip.times(); !at.empty()) s.period = at.size() > 1 ? at[1] : 2 * at[0];
     s.swings = 0.5 * double(tip.times().size());
     s.pieces = pieces(sim, 2 * t.spacing);
-    c.curve(fmt::format("tip_{}_{}_{}", across, throw_speed, epsilon), {"time", "deflection"}, rows);
+    c.curve(fmt::format("tip_{}_{}_{}{}", across, throw_speed, epsilon, accuracy.find("gradient") == accuracy.npos ? "" : "_corrected"),
+            {"time", "deflection"}, rows);
     return s;
 }
 

@@ -6,7 +6,7 @@ tolerance, passed (true, false or null for a number without a gate), seconds, no
 """
 import glob, json, os, sys
 
-from common import FIGURES, RESULTS
+from common import COLOURS, FIGURES, RESULTS, figure
 from known import MISSES
 
 INTRO = """# Verification and validation
@@ -103,7 +103,7 @@ def render(page, cases):
     if missed:
         text.append("| missed | gate | result | why |\n|---|---|---|---|\n" + "\n".join(
             f"| {r['case']}: {cell(r['what'])} | {quantity(r)}, {cell(r['tolerance'])} | {number(r['result'])} | "
-            f"{cell(MISSES.get((r['case'], r['what']), 'not understood yet'))} |" for r in missed) + "\n")
+            f"{cell(MISSES.get((r['case'], r['what'])) or r.get('note') or 'not understood yet')} |" for r in missed) + "\n")
     for name, content in cases.items():
         text.append(f"### {name}\n")
         if name in ABOUT:
@@ -125,9 +125,39 @@ def render(page, cases):
     return "\n".join(text).rstrip() + "\n"
 
 
+def draw_closed_forms():
+    """Figures of the C++ cases, from the curves they leave; gives {case: figure} of those there are."""
+    drawn = {}
+    column = os.path.join(RESULTS, "SPH-7_stress.csv")
+    if os.path.exists(column):
+        drawn["SPH-7"] = figure("sph_7_column", f"""set xlabel 'stress (kPa)'; set ylabel 'height (m)'; set key left top
+set title 'SPH-7: elastic column at rest, 10, 20, 50 and 100 spacings'
+plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' title 'closed form, -rho g d', \\
+  '' every ::1 using ($1==10?$3/1e3:NaN):2 pt 7 ps 1.0 lc rgb '{COLOURS[1]}' title 'sigma_z, 10 spacings', \\
+  '' every ::1 using ($1==50?$3/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[0]}' title 'sigma_z, 50 spacings', \\
+  '' every ::1 using ($1==50?$4/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[2]}' title 'sigma_x, 50 spacings'
+""")
+    tips = {}
+    for path in sorted(glob.glob(os.path.join(RESULTS, "SPH-5*_tip_*_0.05_0.3*.csv"))):
+        tips[int(os.path.basename(path).split("_tip_")[1].split("_")[0]), "corrected" in path] = path
+    if tips:
+        lines = ", ".join(f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 lc rgb '{COLOURS[k]}' title 'H/dx = {n}{', corrected gradient' if c else ''}'"
+                          for k, ((n, c), p) in enumerate(sorted(tips.items())))
+        drawn["SPH-5"] = figure("sph_5_plate", f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key right top
+set title 'SPH-5: plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
+set arrow from 0.127,graph 0 to 0.127,graph 1 nohead dt 2; set label 'T/2' at 0.129,graph 0.95
+plot {lines}
+""")
+    return drawn
+
+
 def main(page):
+    cases = rows()
+    for name, picture in draw_closed_forms().items():
+        for row in list(cases.get(name, {}).values())[:1]:
+            row["figure"] = picture
     with open(page, "w") as f:
-        f.write(render(page, rows()))
+        f.write(render(page, cases))
     print(page)
 
 
