@@ -149,7 +149,7 @@ try:
     check(open(root + "/docs/scene.md").read() == call("reference").stdout, "docs/scene.md is what `kuzure reference` prints")
     call("report", "again")
     page = open(work + "/again/report.html").read()
-    check("<svg" in page and "data:image/png" in page and "http" not in page.split("<h2>Scene")[0], "report.html is self-contained")
+    check("<svg" in page and "data:image/png" in page and "://" not in page.split("<h2>Scene")[0], "report.html is self-contained")
     call("report", "nowhere", expect=2)
     version = call("--version").stdout
     check("kuzure" in version and "GCC" in version, "--version tells program and compiler")
