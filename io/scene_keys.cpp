@@ -204,7 +204,7 @@ std::vector<Key> make_keys()
          any,
          {"auto"},
          "{ zeta = 0.1 }",
-         "against noise in the stress; \"auto\" is on where stress is written to snapshots under vertical gravity"},
+         "against noise in the stress; \"auto\" is on for one dry soil in boxes or cylinders under vertical gravity"},
         {"effects.stress_diffusion.zeta", Number, "1", Default, "0.1", between(0, 1), {}, "0.1", "strength"},
         {"effects.pore_pressure",
          Table,

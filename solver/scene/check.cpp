@@ -59,6 +59,9 @@ std::string no_static_part(const Scene& scene)
     const auto& g = scene.effects.gravity;
     if (g && (g->x != 0 || g->y != 0)) return "gravity is not vertical, so the ground is not level";
     if (scene.soils.size() > 1) return "there are several soils, between which stress jumps";
+    for (const auto& body : scene.bodies)
+        if (!std::holds_alternative<Box>(body.shape) && !std::holds_alternative<Cylinder>(body.shape))
+            return "a body is no box or cylinder, so the ground may not be level";
     if (scene.effects.pore_pressure) return "effective stress under water does not grow with the soil's own weight";
     return {};
 }
