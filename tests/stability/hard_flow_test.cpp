@@ -7,10 +7,23 @@ using namespace kuzure::validation;
 namespace {
 
 struct Contained {
-    double depth = 0;
+    double depth = 0, seen_by_guard = 0; // spacings
     int outside = 0;
     Outcome outcome;
 };
+/// Runs a scene and looks every ten steps how deep (m) any particle is in a wall; in the end, who left low .. high.
+template <class Depth> Contained contained(const SceneText& t, Depth depth, Vector low, Vector high)
+{
+    Simulation sim(Comm::world(), t.scene());
+    Contained r;
+    r.outcome = outcome(sim, [&](const Simulation& s) {
+        if (s.steps() % 10) return;
+        each(s, [&](Index i) { r.depth = std::max(r.depth, depth(position(s, i)) / t.spacing); });
+    });
+    r.seen_by_guard = sim.structure().deepest;
+    r.outside = lost(sim, low, high);
+    return r;
+}
 double into_polygon(Vector x, double half, double high)
 {
     // depth below the two flanks of a wedge with its foot at x = +-half and its ridge at (0, high)
@@ -27,17 +40,9 @@ Contained wedge(double speed, double floor_layers, const std::string& viscosity)
     t.walls = box("wall", {-side - thick, 0, -thick}, {side + thick, 0, 0}, "") + box("wall", {-side - thick, 0, 0}, {-side, 0, 1.2}, "") +
               box("wall", {side, 0, 0}, {side + thick, 0, 1.2}, "") + polygon("wall", {{-half, 0}, {half, 0}, {0, high}}, "");
     t.effects = weight + viscosity;
-    Simulation sim(Comm::world(), t.scene());
-    Contained r;
-    r.outcome = outcome(sim, [&](const Simulation& s) {
-        if (s.steps() % 10) return;
-        each(s, [&](Index i) {
-            const Vector x = position(s, i);
-            r.depth = std::max({r.depth, -x.z / dx, (std::fabs(x.x) - side) / dx, into_polygon(x, half, high) / dx});
-        });
-    });
-    r.depth = std::max(r.depth, sim.structure().deepest);
-    r.outside = lost(sim, {-side, 0, 0}, {side, 0, 1.2});
+    const auto depth = [&](Vector x) { return std::max({-x.z, std::fabs(x.x) - side, into_polygon(x, half, high)}); };
+    auto r = contained(t, depth, {-side, 0, 0}, {side, 0, 1.2});
+    r.depth = std::max(r.depth, r.seen_by_guard);
     return r;
 }
 /// Soil behind a wall of so many layers, after it was thrown at it.
@@ -51,17 +56,8 @@ Contained retained(double layers, double speed)
     t.walls = box("wall", {-0.08, 0, -0.08}, {1.2, 0, 0}, "") + box("wall", {-0.08, 0, 0}, {0, 0, 0.8}, "") +
               box("wall", {0.4, 0, 0}, {0.4 + layers * dx, 0, 0.8}, "");
     t.effects = weight + mild;
-    Simulation sim(Comm::world(), t.scene());
-    Contained r;
-    r.outcome = outcome(sim, [&](const Simulation& s) {
-        if (s.steps() % 10) return;
-        each(s, [&](Index i) {
-            const Vector x = position(s, i);
-            r.depth = std::max({r.depth, -x.z / dx, -x.x / dx, (x.x - 0.4) / dx});
-        });
-    });
-    r.outside = lost(sim, {0, 0, 0}, {0.4, 0, 0.8});
-    return r;
+    const auto depth = [&](Vector x) { return std::max({-x.z, -x.x, x.x - 0.4}); };
+    return contained(t, depth, {0, 0, 0}, {0.4, 0, 0.8});
 }
 
 struct Tall {
