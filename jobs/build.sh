@@ -17,7 +17,10 @@ if [ -f "$cache" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$PWD" "$cache";
 memory=$(awk '/^MemAvailable/ {print int($2 / 1048576)}' /proc/meminfo)
 jobs=$((memory < 1 ? 1 : memory < KUZURE_CORES ? memory : KUZURE_CORES))
 options=()
-if command -v ccache >/dev/null; then options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
+if command -v ccache >/dev/null; then
+    options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+    export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 # clones and work trees share what one of them compiled
+fi
 
 started=$SECONDS
 failed() {

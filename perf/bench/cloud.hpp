@@ -2,6 +2,7 @@
 // A cloud of particles without a scene file: jittered lattice with smooth fields, sorted and with lists, for benchmarks
 // and for tests of the pair pass.
 #include "solver/kernels/step.hpp"
+#include "solver/scene/scene.hpp"
 #include <random>
 
 namespace kuzure::bench {

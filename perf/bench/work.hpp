@@ -53,7 +53,7 @@ inline std::vector<Workload> workloads(scene::Precision precision)
 template <class T> class ReadyPass {
 public:
     ReadyPass(const Scene& s, Arithmetic arithmetic, int edge, double jitter)
-        : model_(choose_model(s, arithmetic)), cloud_(edge, jitter, s), water_(PoreWater::from(s))
+        : model_(choose_model(s, arithmetic)), cloud_(edge, jitter, s), water_(PoreWater::from(s.effects))
     {
 #pragma omp parallel
         flush_denormals();

@@ -4,6 +4,7 @@
 #include "io/file.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/fill.hpp"
+#include "solver/scene/scene.hpp"
 #include <string>
 
 namespace kuzure {

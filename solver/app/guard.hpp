@@ -5,6 +5,7 @@
 #include "solver/neighbours/lists.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/scene.hpp"
 #include <string>
 
 namespace kuzure {

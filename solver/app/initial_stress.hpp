@@ -3,13 +3,14 @@
 #include "solver/physics/terms.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/scene.hpp"
 
 namespace kuzure {
 
 class InitialStress {
 public:
     InitialStress(const Scene& s, const scene::Filling& f, std::span<const Material> soils)
-        : scene_(s), filling_(f), soils_(soils), water_(PoreWater::from(s))
+        : scene_(s), filling_(f), soils_(soils), water_(PoreWater::from(s.effects))
     {
         gravity_ = s.effects.gravity ? -s.effects.gravity->z : 0;
     }

@@ -114,7 +114,7 @@ void Simulation::prepare()
     reach_ = scene_.support() * (1 + scene_.accuracy.skin);
     skin_ = scene_.support() * scene_.accuracy.skin;
     forces_.gravity = scene_.effects.gravity.value_or(Vector{});
-    water_ = PoreWater::from(scene_);
+    water_ = PoreWater::from(scene_.effects);
     for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
     particles_.require(field::position, field::velocity, field::half_velocity, field::density, field::half_density, field::stress,
                        field::half_stress, field::plastic_strain, field::sorted_position, field::origin, field::id, field::soil);

@@ -8,6 +8,7 @@
 #include "solver/app/energy.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/fill.hpp"
+#include "solver/scene/scene.hpp"
 #include <functional>
 #include <variant>
 

@@ -1,13 +1,14 @@
 #include "solver/core/ensure.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/kernels/variants.hpp"
+#include "solver/scene/scene.hpp"
 
 namespace kuzure {
 
-template <int I> std::unique_ptr<PairModel> make_variant(const Scene&, Arithmetic); // variant.cpp
+template <int I> std::unique_ptr<PairModel> make_variant(const scene::Interactions&, Arithmetic); // variant.cpp
 
 namespace {
-template <int I> std::unique_ptr<PairModel> first_that_covers(const Scene& s, Arithmetic a)
+template <int I> std::unique_ptr<PairModel> first_that_covers(const scene::Interactions& s, Arithmetic a)
 {
     if constexpr (I == KUZURE_VARIANTS) throw Broken("no compiled pair model covers this scene: see solver/kernels/variants.hpp");
     else {
@@ -17,7 +18,8 @@ template <int I> std::unique_ptr<PairModel> first_that_covers(const Scene& s, Ar
 }
 } // namespace
 
-std::unique_ptr<PairModel> choose_model(const Scene& s, Arithmetic a) { return first_that_covers<0>(s, a); }
+std::unique_ptr<PairModel> choose_model(const scene::Interactions& s, Arithmetic a) { return first_that_covers<0>(s, a); }
+std::unique_ptr<PairModel> choose_model(const Scene& s, Arithmetic a) { return choose_model(s.interactions(), a); }
 
 template <class T>
 Record<T> make_record(const Places<T>& place, Vector x, Vector v, double volume, double density, const Stress& s, double c)

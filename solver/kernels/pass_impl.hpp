@@ -606,10 +606,10 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
 template <class Model, class V> class Compiled final : public PairModel {
 public:
     using T = number<V>;
-    explicit Compiled(const Scene& s)
-        : unit_(pass::single<V> ? s.smoothing_length() : 1.0), dimensions_(s.dimensions), model_(Model::from(s, unit_)),
+    explicit Compiled(const scene::Interactions& s)
+        : unit_(pass::single<V> ? s.h : 1.0), dimensions_(s.dimensions), model_(Model::from(s, unit_)),
           // grad W in 1/m^(dimensions + 1) from sums in units of unit_
-          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), place_(s.smoothing_length())
+          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), place_(s.h)
     {
     }
     std::string name() const override;

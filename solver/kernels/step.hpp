@@ -6,7 +6,6 @@
 #include "solver/neighbours/lists.hpp"
 #include "solver/physics/terms.hpp"
 #include "solver/scene/material.hpp"
-#include "solver/scene/scene.hpp"
 #include <memory>
 #include <optional>
 
@@ -114,6 +113,7 @@ public:
 };
 
 /// The cheapest compiled model that contains every pair term of the scene (whose "auto" effects are resolved).
+std::unique_ptr<PairModel> choose_model(const scene::Interactions&, Arithmetic);
 std::unique_ptr<PairModel> choose_model(const Scene&, Arithmetic);
 
 /// One record of a particle at its present state.

@@ -4,12 +4,12 @@
 
 namespace kuzure {
 
-template <int I> std::unique_ptr<PairModel> make_variant(const Scene&, Arithmetic);
+template <int I> std::unique_ptr<PairModel> make_variant(const scene::Interactions&, Arithmetic);
 
-template <> std::unique_ptr<PairModel> make_variant<VARIANT>(const Scene& s, Arithmetic a)
+template <> std::unique_ptr<PairModel> make_variant<VARIANT>(const scene::Interactions& s, Arithmetic a)
 {
     using M = std::tuple_element_t<VARIANT, Variants>;
-    const bool mixed = s.accuracy.precision == scene::Precision::Mixed;
+    const bool mixed = s.precision == scene::Precision::Mixed;
     if (a == Arithmetic::Plain && mixed) return std::make_unique<Compiled<M, float>>(s);
     if (a == Arithmetic::Plain) return std::make_unique<Compiled<M, double>>(s);
     if (mixed) return std::make_unique<Compiled<M, Native<float>>>(s);

@@ -1,5 +1,6 @@
 #include "solver/neighbours/columns.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/scene/scene.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 #include <limits>

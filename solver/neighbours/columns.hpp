@@ -4,7 +4,7 @@
 // holds them in the same order: neighbours are summed in it, whatever the ranks, threads, clusters and list skins.
 #include "solver/core/memory.hpp"
 #include "solver/core/tensor.hpp"
-#include "solver/scene/scene.hpp"
+#include "solver/scene/parts.hpp"
 #include <cstdint>
 #include <span>
 #include <vector>

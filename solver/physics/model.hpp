@@ -6,14 +6,14 @@
 namespace kuzure {
 
 struct NoViscosity {
-    static NoViscosity from(const Scene&, double) { return {}; }
+    static NoViscosity from(const scene::Effects&, double) { return {}; }
     static bool covers(const scene::Effects& e) { return !e.viscosity; }
 };
 struct NoArtificialStress {
-    template <class Kernel> static NoArtificialStress from(const Scene&, const Kernel&, double) { return {}; }
+    template <class Kernel> static NoArtificialStress from(const scene::Effects&, const Kernel&, double) { return {}; }
 };
 struct NoStressDiffusion {
-    static NoStressDiffusion from(const Scene&) { return {}; }
+    static NoStressDiffusion from(const scene::Effects&) { return {}; }
 };
 struct NoCorrection {};
 
@@ -32,20 +32,20 @@ struct Model {
     Diffusion stress_diffusion;
     bool correct; // a model with the correction compiled in also serves scenes without
 
-    static Model from(const Scene& s, double unit)
+    static Model from(const scene::Interactions& s, double unit)
     {
-        const Kernel kernel(s.smoothing_length() / unit, s.dimensions);
-        return {kernel, Viscous::from(s, kernel.h), Tension::from(s, kernel, s.space.spacing / unit), Diffusion::from(s),
-                s.accuracy.correction == scene::Correction::Gradient};
+        const Kernel kernel(s.h / unit, s.dimensions);
+        return {kernel, Viscous::from(s.effects, kernel.h), Tension::from(s.effects, kernel, s.spacing / unit), Diffusion::from(s.effects),
+                s.correction == scene::Correction::Gradient};
     }
-    static bool covers(const Scene& s)
+    static bool covers(const scene::Interactions& s)
     {
-        const scene::Kernel asked = s.accuracy.kernel;
+        const scene::Kernel asked = s.kernel;
         const bool same = std::is_same_v<Kernel, CubicSpline>  ? asked == scene::Kernel::CubicSpline
                           : std::is_same_v<Kernel, WendlandC2> ? asked == scene::Kernel::WendlandC2
                                                                : asked == scene::Kernel::WendlandC4;
         return same && Viscous::covers(s.effects) && (tensile || !s.effects.artificial_stress) &&
-               (diffusive || !s.effects.stress_diffusion) && (corrected || s.accuracy.correction == scene::Correction::None);
+               (diffusive || !s.effects.stress_diffusion) && (corrected || s.correction == scene::Correction::None);
     }
 };
 

@@ -5,7 +5,7 @@
 //
 // Law (tests/unit/terms_test.cpp): a term whose coefficient is zero changes no bit of the result.
 #include "solver/core/tensor.hpp"
-#include "solver/scene/scene.hpp"
+#include "solver/scene/parts.hpp"
 
 namespace kuzure {
 
@@ -21,7 +21,7 @@ template <class V> struct Pair {
 /// Artificial viscosity rho_i rho_j Pi_ij of approaching pairs, linear part only (beta = 0). Monaghan (1992), eq. 4.8.
 struct LinearViscosity {
     double alpha, h;
-    static LinearViscosity from(const Scene& s, double h) { return {s.effects.viscosity.value_or(scene::Viscosity{0, 0}).alpha, h}; }
+    static LinearViscosity from(const scene::Effects& e, double h) { return {e.viscosity.value_or(scene::Viscosity{0, 0}).alpha, h}; }
     static bool covers(const scene::Effects& e) { return !e.viscosity || e.viscosity->beta == 0; }
 
     // mu = h approach/(r^2 + 0.01 h^2),  Pi = alpha c_ij mu/rho_ij,  rho_ij = (rho_i + rho_j)/2,  c_ij = (c_i + c_j)/2
@@ -34,9 +34,9 @@ struct LinearViscosity {
 /// The same with Monaghan's quadratic part: Pi = (alpha c_ij mu + beta mu^2)/rho_ij.
 struct Viscosity {
     double alpha, beta, h;
-    static Viscosity from(const Scene& s, double h)
+    static Viscosity from(const scene::Effects& e, double h)
     {
-        const auto v = s.effects.viscosity.value_or(scene::Viscosity{0, 0});
+        const auto v = e.viscosity.value_or(scene::Viscosity{0, 0});
         return {v.alpha, v.beta, h};
     }
     static bool covers(const scene::Effects&) { return true; }
@@ -54,9 +54,9 @@ struct Viscosity {
 /// tensile principal stresses, f = W(r)/W(spacing). Monaghan (2000); Gray et al. (2001); Bui et al. (2008), eq. 34.
 struct ArtificialStress {
     double epsilon, exponent, spacing_value; // 1/W(spacing)
-    template <class Kernel> static ArtificialStress from(const Scene& s, const Kernel& kernel, double spacing)
+    template <class Kernel> static ArtificialStress from(const scene::Effects& e, const Kernel& kernel, double spacing)
     {
-        const auto a = s.effects.artificial_stress.value_or(scene::ArtificialStress{0, 1});
+        const auto a = e.artificial_stress.value_or(scene::ArtificialStress{0, 1});
         return {a.epsilon, a.exponent, 1 / kernel.value(2 * kernel.h - spacing)};
     }
     /// (W(r)/W(spacing))^n from W(r).
@@ -78,9 +78,9 @@ struct ArtificialStress {
 struct StressDiffusion {
     double zeta;
     Vector gravity; // m/s^2
-    static StressDiffusion from(const Scene& s)
+    static StressDiffusion from(const scene::Effects& e)
     {
-        return {s.effects.stress_diffusion.value_or(scene::StressDiffusion{0}).zeta, s.effects.gravity.value_or(Vector{})};
+        return {e.stress_diffusion.value_or(scene::StressDiffusion{0}).zeta, e.gravity.value_or(Vector{})};
     }
     /// Static stress per unit of -rho g . x_ij: K0 1 + (1 - K0) g^ g^.
     template <class V> Sym3<V> at_rest(V K0) const
@@ -126,11 +126,11 @@ struct GradientCorrection {
 struct PoreWater {
     std::vector<std::array<double, 2>> table; // x, z in m
     double unit_weight = 0;                   // N/m^3
-    static PoreWater from(const Scene& s)
+    static PoreWater from(const scene::Effects& e)
     {
-        const auto& p = s.effects.pore_pressure;
+        const auto& p = e.pore_pressure;
         if (!p) return {};
-        return {p->table, p->density * length(s.effects.gravity.value_or(Vector{}))};
+        return {p->table, p->density * length(e.gravity.value_or(Vector{}))};
     }
     bool present() const { return !table.empty(); }
     /// Pressure (Pa) and its gradient (Pa/m) at a point.

@@ -1,6 +1,6 @@
 #pragma once
 // The numbers the constitutive law works with, derived from a soil as it stands in the scene.
-#include "solver/scene/scene.hpp"
+#include "solver/scene/parts.hpp"
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,7 +1,7 @@
 #pragma once
 // Geometry of the shapes of bodies and walls. Distances are negative inside, and every function is defined
 // everywhere: on faces, edges and corners and at centres. With dimensions = 2 only x and z count.
-#include "solver/scene/scene.hpp"
+#include "solver/scene/parts.hpp"
 #include <algorithm>
 #include <cmath>
 

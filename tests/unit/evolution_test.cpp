@@ -1,6 +1,7 @@
 // What changes the cone during a run, at one material point: softening, dilation decay, mu(I), still pore water.
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/physics/terms.hpp"
+#include "solver/scene/scene.hpp"
 #include <gtest/gtest.h>
 
 using namespace kuzure;
@@ -126,7 +127,7 @@ TEST(PoreWater, IsHydrostaticBelowItsTable)
     Scene s;
     s.effects.gravity = Vector{0, 0, -9.81};
     s.effects.pore_pressure = scene::PorePressure{{{0.0, 4.0}, {10.0, 2.0}}, 1000};
-    const auto w = PoreWater::from(s);
+    const auto w = PoreWater::from(s.effects);
     EXPECT_NEAR(w.at({-3, 0, 1}).value, 9810 * 3, 1e-9);
     EXPECT_NEAR(w.at({5, 0, 1}).value, 9810 * 2, 1e-9);
     EXPECT_NEAR(w.at({5, 0, 1}).gradient.x, 9810 * -0.2, 1e-9);

@@ -3,6 +3,7 @@
 #include "perf/bench/cloud.hpp"
 #include "solver/kernels/pass_impl.hpp"
 #include "solver/kernels/variants.hpp"
+#include "solver/scene/scene.hpp"
 #include <gtest/gtest.h>
 #include <numeric>
 
@@ -133,7 +134,7 @@ template <class T> PassResult run(const PairModel& model, Cloud& c, double skin,
     for (Index i = 0; i < c.particles.size(); ++i) tension[i] = make_tension<T>(c.particles[field::stress][i], epsilon);
     auto p = c.pass(records, next, dt);
     p.kick = kick;
-    const PoreWater water = PoreWater::from(c.scene);
+    const PoreWater water = PoreWater::from(c.scene.effects);
     p.water = water.present() ? &water : nullptr;
     for (const auto& m : c.soils) p.evolving = p.evolving || m.evolves();
     p.tension = tension.data(), p.next_tension = next_tension.data();
@@ -312,9 +313,9 @@ TEST(Pass, AnyWidthOfLanesAndAnySkinGivesTheSameBits)
 {
     const Scene s = bench::dry_sand();
     using M = Model<CubicSpline, LinearViscosity, NoArtificialStress>;
-    const Compiled<M, Simd<double, 2>> two(s);
-    const Compiled<M, Simd<double, 4>> four(s);
-    const Compiled<M, Simd<double, 16>> sixteen(s);
+    const Compiled<M, Simd<double, 2>> two(s.interactions());
+    const Compiled<M, Simd<double, 4>> four(s.interactions());
+    const Compiled<M, Simd<double, 16>> sixteen(s.interactions());
     Cloud a = arrangement(2, s), b = arrangement(2, s), c = arrangement(2, s);
     run<double>(two, a, 0.02, 1e-4, 1e-4);
     run<double>(four, b, 0.2, 1e-4, 1e-4);
