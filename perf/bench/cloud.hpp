@@ -101,7 +101,7 @@ struct Cloud {
     template <class T> Pass<T> pass(const Array<Record<T>>& records, Array<Record<T>>& next, double dt)
     {
         Pass<T> p{};
-        p.particles = &particles, p.records = records.data(), p.next = next.data(), p.n_records = particles.size();
+        p.particles = &particles, p.records = records.data(), p.next = next.data();
         p.lists = &lists, p.soils = soils, p.volume = scene.particle_volume(), p.h = scene.smoothing_length();
         p.dt = dt, p.kick = dt, p.forces.gravity = scene.effects.gravity.value_or(Vector{}), p.energy_unit = 1e-12;
         return p;

@@ -1,5 +1,6 @@
 // Sorting, list building and the pair pass (sums, constitutive law, leap-frog) on the 52^3 lattice jittered by 0.2 spacings:
-// every workload, double, mixed and plain. Counters: ns per directed pair, Gflop/s, share of this machine's FMA peak.
+// every workload, double, mixed and plain. Counters: ns per directed pair, Gflop/s, shares of the measured FMA peak and of the
+// measured bandwidth with as many threads (by the loops' own count of operations and bytes). JSON: --benchmark_format=json.
 //   build/release/bench_pairs --benchmark_filter='pass.*' --benchmark_enable_random_interleaving=true --benchmark_repetitions=9
 #include "perf/bench/work.hpp"
 #include "perf/machine.hpp"
@@ -32,15 +33,29 @@ void lists(benchmark::State& state)
     state.counters["entries/cluster"] = double(c.lists.entries()) / c.lists.size();
 }
 
+/// The roofs, of one thread or of all.
+const Machine& roofs()
+{
+    static const Machine m = this_machine(instruction_set(), omp_get_num_procs());
+    return m;
+}
+
 template <class T> void pass(benchmark::State& state, const Scene& s, Arithmetic arithmetic)
 {
     omp_set_num_threads(int(state.range(0)));
     bench::ReadyPass<T> ready(s, arithmetic, edge, jitter);
     std::int64_t pairs = 0;
-    for (auto _ : state) pairs = ready.run();
+    for (auto _ : state)
+        for (int k = 0; k < ready.cycle; ++k) pairs = ready.run();
     using benchmark::Counter;
-    state.counters["ns/pair"] = Counter(double(pairs) * 1e-9, Counter::kIsIterationInvariantRate | Counter::kInvert);
-    state.counters["Gflop/s"] = Counter(ready.flops(pairs) * 1e-9, Counter::kIsIterationInvariantRate);
+    state.counters["ns/pair"] = Counter(double(ready.cycle * pairs) * 1e-9, Counter::kIsIterationInvariantRate | Counter::kInvert);
+    state.counters["Gflop/s"] = Counter(ready.cycle * ready.flops(pairs) * 1e-9, Counter::kIsIterationInvariantRate);
+    const bool one = state.range(0) == 1, mixed = std::is_same_v<T, float>;
+    const Machine& m = roofs();
+    const double peak = mixed ? (one ? m.gflops_float_one : m.gflops_float_all) : (one ? m.gflops_double_one : m.gflops_double_all);
+    const double band = one ? m.gbytes_one : m.gbytes_all;
+    state.counters["of FMA peak"] = Counter(ready.cycle * ready.flops(pairs) * 1e-9 / peak, Counter::kIsIterationInvariantRate);
+    state.counters["of bandwidth"] = Counter(ready.cycle * ready.bytes() * 1e-9 / band, Counter::kIsIterationInvariantRate);
     state.SetLabel(ready.model());
 }
 
@@ -65,5 +80,6 @@ int main(int argc, char** argv)
                 if (arithmetic == Arithmetic::Lanes) b->Arg(2);
             }
     benchmark::Initialize(&argc, argv);
+    roofs(); // measured before anything else runs
     benchmark::RunSpecifiedBenchmarks();
 }

@@ -49,9 +49,11 @@ inline std::vector<Workload> workloads(scene::Precision precision)
     return all;
 }
 
-/// The pass of one workload; a step of no length, so the state stays and the work is the same every time.
+/// The pass of one workload; a step of no length, so the state stays and the work is the same every time. As in a collapse,
+/// one pass in `cycle` prunes the lists, with a margin for the others.
 template <class T> class ReadyPass {
 public:
+    static constexpr int cycle = 5;
     ReadyPass(const Scene& s, Arithmetic arithmetic, int edge, double jitter)
         : model_(choose_model(s, arithmetic)), cloud_(edge, jitter, s), water_(PoreWater::from(s.effects))
     {
@@ -70,6 +72,7 @@ public:
     std::int64_t run()
     {
         auto p = cloud_.pass(now_, next_, 0);
+        p.prune = passes_++ % cycle == 0, p.margin = 0.026 * cloud_.scene.support();
         p.kick = 0, p.tension = tension_.data(), p.next_tension = next_tension_.data();
         p.water = water_.present() ? &water_ : nullptr, p.evolving = evolving_;
         return model_->run(p, clusters_).pairs;
@@ -86,6 +89,7 @@ private:
     Cloud cloud_;
     PoreWater water_;
     bool evolving_ = false;
+    std::int64_t passes_ = 0;
     Array<Record<T>> now_, next_;
     Array<Tension<T>> tension_, next_tension_;
     std::vector<Index> clusters_;

@@ -120,6 +120,8 @@ private:
     void renew_walls();
     void make_records();
     bool outgrown() const;
+    /// True where the pruned lists no longer hold everything in reach: then with a margin for the steps to come.
+    bool prune_lists_anew(double dt);
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
     std::size_t row_bytes() const;
     /// Looks for limits that broke in the last step; throws NumbersFailed.
@@ -156,6 +158,8 @@ private:
     PoreWater water_;
     bool evolving_ = false;
     double reach_, skin_; // m
+    // How far beyond the support the pruned lists reach, and a bound of the way of any particle since they were made, m.
+    double pruned_margin_ = 0, pruned_way_ = 0;
     Clock clock_;
     bool built_ = false;
     double busy_before_ = 0;

@@ -2,9 +2,9 @@
 // The pass over pairs, written. Included by variant.cpp only, so that each model is compiled once, in its own object.
 //
 // V: number type of the pair sums (lanes of float in mixed precision), U: of the update, always double. Cluster by
-// cluster: find the list entries in reach now, geometry of each, sums, then constitutive law and leap-frog, while the
-// sums are in the first-level cache. Sums are centred on i, which owns a lane; j is broadcast to all lanes and comes in
-// the global order. What lies beyond the support adds exact zeros, so the bits do not depend on list or cluster.
+// cluster: every few steps prune the list to what is in reach soon, geometry of each entry, sums, then constitutive law and
+// leap-frog, while the sums are in the first-level cache. Sums are centred on i, which owns a lane; j is broadcast to all lanes and comes
+// in the global order. What lies beyond the support adds exact zeros, so the bits do not depend on list or cluster.
 #include "solver/kernels/step.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/physics/model.hpp"
@@ -55,6 +55,20 @@ template <class V> struct Here {
     int count;
     unsigned owned; // a bit for each lane that holds a particle of this cluster
 };
+
+/// Keeps of a list, in its order, what is nearer than `reach` to any particle of the cluster; returns how many.
+template <class V, class T>
+KUZURE_INLINE Index prune(const Here<V>& i, std::span<const Index> list, const Record<T>* records, double reach, Index* kept)
+{
+    const V reach2(T(reach * reach));
+    Index n = 0;
+    for (const Index k : list) {
+        const Vec3<V> r = i.position.minus(records[k]);
+        kept[n] = k;
+        n += (bits(less(dot(r, r), reach2)) & i.owned) != 0;
+    }
+    return n;
+}
 
 /// Sums of one cluster, in double, ready for the update: rows of W lanes.
 template <int W, class Model> struct alignas(64) Sums {
@@ -110,114 +124,101 @@ template <class V, class T> Positions<V> positions_of(const Record<T>* records, 
     return p;
 }
 
-/// The pair sums of one cluster with its soil neighbours; returns the pairs inside the support.
+/// The pair sums of one cluster with its soil neighbours; returns the pairs inside the support. Entries of the list beyond
+/// it add exact zeros.
 template <class Model, class V, class T>
-KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, std::span<const Index> list, const Record<T>* records,
-                                         const Tension<T>* tension, Index far_away, Sums<width<V>, Model>& out)
+KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, std::span<const Index> near, const Record<T>* records,
+                                         const Tension<T>* tension, Sums<width<V>, Model>& out)
 {
-    constexpr int batch = 16, room = 256;
+    constexpr int batch = 16;
     const V support(T(2 * model.kernel.h)), support2(T(4 * model.kernel.h * model.kernel.h));
-    const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0));
+    const V softening(T(0.01 * model.kernel.h * model.kernel.h)), tiny(T(1e-12 * model.kernel.h * model.kernel.h)), zero(T(0)), one(T(1));
     struct Terms {
         Vec3<V> grad, v, r;
         V pressure, close, q, along;
     };
     Terms terms[batch];
-    Index near[room + batch];
     Mat3<V> L{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
     Vec3<V> A{zero, zero, zero}, G = A, F = A, B = A;
     Sym3<V> S{zero, zero, zero, zero, zero, zero}, M = S;
-    V power = zero, Q = zero, Qg = zero;
-    std::int64_t pairs = 0;
-
-    for (std::size_t begin = 0; begin < list.size(); begin += room) {
-        const std::size_t end = std::min(list.size(), begin + room);
-        int n = 0;
-        for (std::size_t k = begin; k < end; ++k) {
-            const Vec3<V> r = i.position.minus(records[list[k]]);
-            const unsigned hits = bits(less(dot(r, r), support2)) & i.owned;
-            near[n] = list[k];
-            n += hits != 0;
-            pairs += std::popcount(hits);
+    V power = zero, Q = zero, Qg = zero, inside = zero;
+    const int n = int(near.size());
+    for (int b = 0; b < n; b += batch) {
+        const int m = std::min(batch, n - b);
+        // ---- geometry: gradient of W, approach, viscosity
+        for (int k = 0; k < m; ++k) {
+            const Record<T>& j = records[near[b + k]];
+            const Vec3<V> r = i.position.minus(j);
+            const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+            const V r2 = max(dot(r, r), tiny);
+            inside = inside + select(less(r2, support2), one, zero);
+            const V rho_sum = i.rho + j.density;
+            const auto inv = roots<Model::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+            const V t = max(support - inv.root, zero);
+            const V w = model.kernel.shape(t, inv.root, inv.inverse_root) * j.volume;
+            terms[k].grad = w * r;
+            terms[k].v = v;
+            if constexpr (Model::viscous) {
+                // rho_i rho_j Pi > 0 where the two approach
+                const V approach = max(dot(v, r), zero);
+                const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.sound_speed)};
+                const V pressure = model.viscosity(pair);
+                terms[k].pressure = pressure;
+                power = fma(pressure * w, approach, power);
+            }
+            if constexpr (Model::tensile) terms[k].close = model.kernel.value(t);
+            if constexpr (Model::diffusive) {
+                terms[k].q = w * (r2 * (inv.inverse * rho_sum));
+                const Vector g = model.stress_diffusion.gravity;
+                terms[k].along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+            }
+            if constexpr (Model::corrected) terms[k].r = r;
         }
-        if constexpr (width < V >> 1)
-            while (n % 2) near[n++] = far_away;
-
-        for (int b = 0; b < n; b += batch) {
-            const int m = std::min(batch, n - b);
-            // ---- geometry: gradient of W, approach, viscosity
+        // ---- grad v = sum_j V_j (v_j - v_i) (x) grad W
+        // (unrolled in full, GCC 12 would keep five of the nine sums in memory)
+#pragma GCC unroll 1
+        for (int k = 0; k < m; ++k) {
+            const Vec3<V> g = terms[k].grad, v = terms[k].v;
+            L.x = fma(v.x, g, L.x);
+            L.y = fma(v.y, g, L.y);
+            L.z = fma(v.z, g, L.z);
+        }
+        // ---- rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j - rho_i rho_j Pi + f^n (tau_i + tau_j) ] . grad W
+        for (int k = 0; k < m; ++k) {
+            const Record<T>& j = records[near[b + k]];
+            const Vec3<V> g = terms[k].grad;
+            Sym3<V> s{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)};
+            if constexpr (Model::viscous) s = plus_isotropic(s, -terms[k].pressure);
+            if constexpr (Model::tensile) {
+                const Tension<T>& tj = tension[near[b + k]];
+                bool any = tj.any != 0;
+                for (int l = 0; l < i.count && !any; ++l) any = tension[i.first + l].any != 0;
+                if (any) {
+                    const V f = model.artificial_stress.closeness(terms[k].close);
+                    const Vec3<V> near_j = f * g;
+                    B = B + Sym3<V>{V(tj.xx), V(tj.yy), V(tj.zz), V(tj.xy), V(tj.yz), V(tj.xz)} * near_j;
+                    F = F + near_j;
+                }
+            }
+            A = A + s * g;
+            G = G + g;
+        }
+        // ---- stress diffusion: sum_j V_j (sigma_i - sigma_j - static part) x_ij . grad W/(r^2 + 0.01 h^2)
+        if constexpr (Model::diffusive)
             for (int k = 0; k < m; ++k) {
                 const Record<T>& j = records[near[b + k]];
-                const Vec3<V> r = i.position.minus(j);
-                const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
-                const V r2 = max(dot(r, r), tiny);
-                const V rho_sum = i.rho + j.density;
-                const auto inv = reciprocals(r2, (r2 + softening) * rho_sum);
-                const V length = r2 * inv.inverse_sqrt;
-                const V t = max(support - length, zero);
-                const V w = model.kernel.shape(t, length, inv.inverse_sqrt) * j.volume;
-                terms[k].grad = w * r;
-                terms[k].v = v;
-                if constexpr (Model::viscous) {
-                    // rho_i rho_j Pi > 0 where the two approach
-                    const V approach = max(dot(v, r), zero);
-                    const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.sound_speed)};
-                    const V pressure = model.viscosity(pair);
-                    terms[k].pressure = pressure;
-                    power = fma(pressure * w, approach, power);
-                }
-                if constexpr (Model::tensile) terms[k].close = model.kernel.value(t);
-                if constexpr (Model::diffusive) {
-                    terms[k].q = w * (r2 * (inv.inverse * rho_sum));
-                    const Vector g = model.stress_diffusion.gravity;
-                    terms[k].along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
-                }
-                if constexpr (Model::corrected) terms[k].r = r;
+                const V q = terms[k].q;
+                S = fma(q, Sym3<V>{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)}, S);
+                Q = Q + q;
+                Qg = fma(q, terms[k].along, Qg);
             }
-            // ---- grad v = sum_j V_j (v_j - v_i) (x) grad W
+        // ---- M = sum_j V_j (x_j - x_i) (x) grad W
+        if constexpr (Model::corrected)
             for (int k = 0; k < m; ++k) {
-                const Vec3<V> g = terms[k].grad, v = terms[k].v;
-                L.x = fma(v.x, g, L.x);
-                L.y = fma(v.y, g, L.y);
-                L.z = fma(v.z, g, L.z);
+                const Vec3<V> g = terms[k].grad, r = terms[k].r;
+                M = {fma(g.x, r.x, M.xx), fma(g.y, r.y, M.yy), fma(g.z, r.z, M.zz),
+                     fma(g.x, r.y, M.xy), fma(g.y, r.z, M.yz), fma(g.x, r.z, M.xz)};
             }
-            // ---- rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j - rho_i rho_j Pi + f^n (tau_i + tau_j) ] . grad W
-            for (int k = 0; k < m; ++k) {
-                const Record<T>& j = records[near[b + k]];
-                const Vec3<V> g = terms[k].grad;
-                Sym3<V> s{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)};
-                if constexpr (Model::viscous) s = plus_isotropic(s, -terms[k].pressure);
-                if constexpr (Model::tensile) {
-                    const Tension<T>& tj = tension[near[b + k]];
-                    bool any = tj.any != 0;
-                    for (int l = 0; l < i.count && !any; ++l) any = tension[i.first + l].any != 0;
-                    if (any) {
-                        const V f = model.artificial_stress.closeness(terms[k].close);
-                        const Vec3<V> near_j = f * g;
-                        B = B + Sym3<V>{V(tj.xx), V(tj.yy), V(tj.zz), V(tj.xy), V(tj.yz), V(tj.xz)} * near_j;
-                        F = F + near_j;
-                    }
-                }
-                A = A + s * g;
-                G = G + g;
-            }
-            // ---- stress diffusion: sum_j V_j (sigma_i - sigma_j - static part) x_ij . grad W/(r^2 + 0.01 h^2)
-            if constexpr (Model::diffusive)
-                for (int k = 0; k < m; ++k) {
-                    const Record<T>& j = records[near[b + k]];
-                    const V q = terms[k].q;
-                    S = fma(q, Sym3<V>{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)}, S);
-                    Q = Q + q;
-                    Qg = fma(q, terms[k].along, Qg);
-                }
-            // ---- M = sum_j V_j (x_j - x_i) (x) grad W
-            if constexpr (Model::corrected)
-                for (int k = 0; k < m; ++k) {
-                    const Vec3<V> g = terms[k].grad, r = terms[k].r;
-                    M = {fma(g.x, r.x, M.xx), fma(g.y, r.y, M.yy), fma(g.z, r.z, M.zz),
-                         fma(g.x, r.y, M.xy), fma(g.y, r.z, M.yz), fma(g.x, r.z, M.xz)};
-                }
-        }
     }
     std::fill_n(out.walled, width<V>, 0.0);
     const V* rows[] = {&L.x.x, &L.x.y, &L.x.z, &L.y.x, &L.y.y, &L.y.z, &L.z.x, &L.z.y, &L.z.z};
@@ -237,6 +238,10 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
         const V* sums[] = {&M.xx, &M.yy, &M.zz, &M.xy, &M.yz, &M.xz};
         for (int k = 0; k < 6; ++k) store_wide(out.moment[k], *sums[k]);
     }
+    T in_lane[width<V>];
+    store(in_lane, inside);
+    std::int64_t pairs = 0;
+    for (int k = 0; k < i.count; ++k) pairs += std::int64_t(in_lane[k]);
     return pairs;
 }
 
@@ -326,9 +331,8 @@ template <class Model, class V, class T>
             if (!hits) continue;
             pairs += std::popcount(hits);
             const V rho_sum = i.rho + i.rho;
-            const auto inv = reciprocals(r2, (r2 + softening) * rho_sum);
-            const V length = r2 * inv.inverse_sqrt;
-            const V w = model.kernel.shape(max(support - length, zero), length, inv.inverse_sqrt);
+            const auto inv = roots<Model::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+            const V w = model.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root);
             const Vec3<V> g = w * r;
             // 1 + d_B/d_A = r.n/d_A, between 1 and 1.5
             const V factor = min(max(dot(r, n) * inverse_d, V(T(1))), V(T(1.5)));
@@ -380,7 +384,7 @@ template <class Model, class V, class T>
 /// Energies and extremes of the clusters one thread has done, a lane each.
 template <class U> struct Accumulated {
     U plastic{0.0}, viscous{0.0}, wall{0.0}, damping{0.0};
-    U acceleration2{0.0}, signal{0.0}, moved2{0.0}, speed2{0.0}, strained{0.0};
+    U acceleration2{0.0}, signal{0.0}, moved2{0.0}, speed2{0.0}, drift2{0.0}, strained{0.0};
     U not_finite{0.0}; // zero, or not a number
     double outside = 0;
     std::int64_t pairs = 0;
@@ -388,8 +392,8 @@ template <class U> struct Accumulated {
     {
         // exact sums: their order does not count
         return {{sum(plastic), sum(viscous), sum(wall), sum(damping)},
-                {largest(acceleration2), largest(signal), largest(moved2), largest(speed2), sum(not_finite) == 0 ? 0.0 : 1.0, outside,
-                 largest(strained)},
+                {largest(acceleration2), largest(signal), largest(moved2), largest(speed2), largest(drift2),
+                 sum(not_finite) == 0 ? 0.0 : 1.0, outside, largest(strained)},
                 pairs};
     }
 };
@@ -573,7 +577,7 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     const U worked = quantized(volume * mapped.work, magic);
     const U damped = quantized(volume * rho * mu_d * dot(v, v) * kick, magic);
     const Vec3<U> moved = x - x_sorted.template load<U>(at);
-    const U a2 = dot(a, a), m2 = dot(moved, moved), v2 = dot(v_end, v_end);
+    const U a2 = dot(a, a), m2 = dot(moved, moved), v2 = dot(v_end, v_end), d2 = dot(v_h, v_h);
     const U signal = fma(U(pass.h), sqrt(contract(D, D)), c);
     const U finite = fma(zero, a2, fma(zero, v2, fma(zero, trace(s_end), zero * rho_end)));
     const U walled = quantized(volume * load<U>(wall_power + row) * kick, magic);
@@ -588,6 +592,7 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     total.acceleration2 = max(select(mine, a2, zero), total.acceleration2);
     total.moved2 = max(select(mine, m2, zero), total.moved2);
     total.speed2 = max(select(mine, v2, zero), total.speed2);
+    total.drift2 = max(select(mine, d2, zero), total.drift2);
     total.strained = max(select(mine, max(rho_end / rho0, rho0 / rho_end), zero), total.strained);
     total.signal = max(select(mine, signal, zero), total.signal);
     total.not_finite += select(mine, finite, zero);
@@ -679,7 +684,13 @@ private:
         pass::Sums<W, Model> sums;
         double wall_power[W + width<U>] = {};
         // every particle meets itself once in its list
-        total.pairs += pass::sum_over_soil(model_, i, p.lists->soil(cluster), p.records, p.tension, p.n_records, sums) - i.count;
+        const auto pruned = p.lists->pruned(cluster);
+        if (p.prune) {
+            const double reach = 2 * model_.kernel.h + p.margin / unit_;
+            pruned.n = pass::prune(i, p.lists->soil(cluster), p.records, reach, pruned.entries);
+        }
+        const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
+        total.pairs += pass::sum_over_soil(model_, i, near, p.records, p.tension, sums) - i.count;
         const auto walls = p.lists->walls(cluster);
         if (!walls.empty()) total.pairs += pass::sum_over_walls(model_, i, p, walls, unit_, dimensions_, scale_, sums, wall_power);
         for (int row = 0; row < i.count; row += width<U>)

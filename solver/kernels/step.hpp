@@ -35,6 +35,7 @@ struct Extremes {
     double signal = 0;        // c_p + h |D|, m/s
     double moved2 = 0;        // squared way since the last sort, m^2
     double speed2 = 0;        // (m/s)^2
+    double drift2 = 0;        // (m/s)^2, of the half-step velocity that moved the particle
     double bad = 0;           // 1 where a number is not finite
     double outside = 0;       // 1 where a particle left the box
     double strained = 0;      // density over that at the start, or the other way round
@@ -50,12 +51,13 @@ struct StepForces {
 /// and their half-step twins.
 template <class T> struct Pass {
     Particles* particles;
-    const Record<T>* records; // owned, then ghosts, then one far away
+    const Record<T>* records; // owned, then ghosts
     Record<T>* next;          // owned particles' records at the end of the step
     const Tension<T>* tension = nullptr;
     Tension<T>* next_tension = nullptr;
-    Index n_records; // index of the far-away record
-    const ClusterLists* lists;
+    ClusterLists* lists;
+    bool prune = true; // make the pruned lists anew from the lists; else those of an earlier pass hold everything in reach
+    double margin = 0; // m, how far beyond the support the pruned lists reach
     std::span<const WallRecords<T>> walls;
     std::span<const Material> soils;
     double volume; // m^3 (m^2 in 2-D) of one particle at reference density
@@ -86,6 +88,7 @@ struct PassResult {
              max(y.signal, x.signal),
              max(y.moved2, x.moved2),
              max(y.speed2, x.speed2),
+             max(y.drift2, x.drift2),
              max(y.bad, x.bad),
              max(y.outside, x.outside),
              max(y.strained, x.strained)};

@@ -163,7 +163,8 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
     for (std::size_t c = 0; c < n_columns; ++c)
         cluster_start[c + 1] = cluster_start[c] + (cols.start[c + 1] - cols.start[c] + width - 1) / width;
     const Index n = n_columns ? cluster_start[n_columns] : 0;
-    first_.resize(n), count_.resize(n), soil_.resize(n), walls_.resize(n), n_soil_.resize(n), n_walls_.resize(n);
+    first_.resize(n), count_.resize(n), soil_.resize(n), walls_.resize(n), n_soil_.resize(n), n_walls_.resize(n), pruned_.resize(n);
+    n_pruned_.resize(n);
 
     // ---- single-precision coordinates relative to the middle of the owned soil, with slack for their rounding
     Vector lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
@@ -179,7 +180,7 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
     for (const auto& w : walls) wall_points.push_back(of_walls(w, origin));
 
     const int threads = omp_get_max_threads();
-    soil_store_.resize(threads), wall_store_.resize(threads);
+    soil_store_.resize(threads), wall_store_.resize(threads), pruned_store_.resize(threads);
     struct Place {
         int thread;
         std::size_t soil, walls;
@@ -218,6 +219,7 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
                 const std::size_t before = used;
                 used = find(soil, columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach, out, used, grower(out));
                 n_soil_[c] = Index(used - before);
+                entries += used - before;
                 for (std::size_t k = before; k < used; ++k)
                     if (out[k] >= owned.n) {
                         has_ghost[c] = 1;
@@ -240,12 +242,14 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
                 n_walls_[c] = Index(wall_used - wall_before);
             }
         }
-        entries += used;
+        // Untouched until a thread of the pass writes it.
+        if (pruned_store_[t].size() < used + narrow) pruned_store_[t].resize(used + used / 8 + narrow);
     }
     entries_ = entries, wall_entries_ = wall_entries;
     interior_.clear(), rim_.clear();
     for (Index c = 0; c < n; ++c) {
         soil_[c] = soil_store_[place[c].thread].data() + place[c].soil;
+        pruned_[c] = pruned_store_[place[c].thread].data() + place[c].soil;
         walls_[c] = wall_store_[place[c].thread].data() + place[c].walls;
         (has_ghost[c] ? rim_ : interior_).push_back(c);
     }
@@ -253,8 +257,9 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
 
 std::size_t ClusterLists::bytes() const
 {
-    std::size_t b = first_.capacity() * (sizeof(Index) * 3 + 1 + 2 * sizeof(void*));
+    std::size_t b = first_.capacity() * (sizeof(Index) * 4 + 1 + 3 * sizeof(void*));
     for (const auto& s : soil_store_) b += s.capacity() * sizeof(Index);
+    for (const auto& s : pruned_store_) b += s.capacity() * sizeof(Index);
     for (const auto& s : wall_store_) b += s.capacity() * sizeof(Index);
     return b + (interior_.capacity() + rim_.capacity()) * sizeof(Index);
 }

@@ -1,7 +1,8 @@
 #pragma once
 // Cluster lists with a skin: W consecutive particles of a column share one list of everything that can come within the
 // support of any of them before the next rebuild, in the global order. Soil neighbours are record indices (owned first,
-// ghosts after); wall neighbours are runs of points of one wall.
+// ghosts after); wall neighbours are runs of points of one wall. Between rebuilds a pass may prune the soil lists to what
+// can be in reach during the next few steps (Pall & Hess 2013): what is left out or kept never changes a bit.
 #include "solver/neighbours/columns.hpp"
 #include <array>
 
@@ -35,6 +36,12 @@ public:
     Index first(Index c) const { return first_[c]; }
     int count(Index c) const { return count_[c]; }
     std::span<const Index> soil(Index c) const { return {soil_[c], std::size_t(n_soil_[c])}; }
+    /// What the last pruning pass kept of soil(c), written by that pass: room for all of it.
+    struct Pruned {
+        Index* entries;
+        Index& n;
+    };
+    Pruned pruned(Index c) { return {pruned_[c], n_pruned_[c]}; }
     /// Runs of {wall, n, point, point, ...} one after the other.
     std::span<const Index> walls(Index c) const { return {walls_[c], std::size_t(n_walls_[c])}; }
     /// Clusters whose list has no ghost, and the others.
@@ -49,8 +56,9 @@ private:
     Array<Index> first_;
     Array<std::int8_t> count_;
     Array<const Index*> soil_, walls_;
-    Array<Index> n_soil_, n_walls_;
-    std::vector<Array<Index>> soil_store_, wall_store_; // one a thread
+    Array<Index*> pruned_;
+    Array<Index> n_soil_, n_walls_, n_pruned_;
+    std::vector<Array<Index>> soil_store_, wall_store_, pruned_store_; // one a thread
     std::vector<Index> interior_, rim_;
     std::size_t entries_ = 0, wall_entries_ = 0;
 };

@@ -4,7 +4,8 @@
 //
 //     grad_i W_ij = scale * shape * (x_i - x_j)
 //
-// so that the constant is taken out of the sums. shape is exactly zero beyond the support.
+// so that the constant is taken out of the sums. shape is exactly zero beyond the support. Only a kernel that `divides` is given
+// 1/r.
 #include "solver/core/simd.hpp"
 #include <numbers>
 
@@ -12,6 +13,7 @@ namespace kuzure {
 
 /// Cubic B-spline (Monaghan & Lattanzio 1985): W = A (1 - 3/2 q^2 + 3/4 q^3) for q < 1, A/4 (2 - q)^3 for q < 2.
 struct CubicSpline {
+    static constexpr bool divides = true;
     double h, a;
     double scale;
     CubicSpline(double h, int dimensions)
@@ -35,6 +37,7 @@ struct CubicSpline {
 
 /// Wendland C2 (Wendland 1995): W = A (1 - q/2)^4 (2 q + 1).
 struct WendlandC2 {
+    static constexpr bool divides = false;
     double h, a;
     double scale;
     WendlandC2(double h, int dimensions)
@@ -54,6 +57,7 @@ struct WendlandC2 {
 
 /// Wendland C4 (Wendland 1995): W = A (1 - q/2)^6 (35/12 q^2 + 3 q + 1).
 struct WendlandC4 {
+    static constexpr bool divides = false;
     double h, a;
     double scale;
     WendlandC4(double h, int dimensions)

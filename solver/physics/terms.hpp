@@ -27,7 +27,8 @@ struct LinearViscosity {
     // mu = h approach/(r^2 + 0.01 h^2),  Pi = alpha c_ij mu/rho_ij,  rho_ij = (rho_i + rho_j)/2,  c_ij = (c_i + c_j)/2
     template <class V> KUZURE_INLINE V operator()(const Pair<V>& p) const
     {
-        return (p.approach * p.inverse * p.rho_j) * (p.rho_i * (V(number<V>(alpha * h)) * (p.c_i + p.c_j)));
+        const V strength = V(number<V>(alpha * h)) * p.rho_i; // of i alone
+        return (p.approach * p.inverse * p.rho_j) * fma(strength, p.c_j, strength * p.c_i);
     }
 };
 
@@ -45,8 +46,8 @@ struct Viscosity {
     {
         const V a = p.approach * p.inverse;
         const V mu = a * p.rho_sum * V(number<V>(h));
-        const V strength = fma(V(number<V>(2 * beta * h)), mu, V(number<V>(alpha * h)) * (p.c_i + p.c_j));
-        return (a * p.rho_j) * (p.rho_i * strength);
+        const V linear = V(number<V>(alpha * h)) * p.rho_i, quadratic = V(number<V>(2 * beta * h)) * p.rho_i; // of i alone
+        return (a * p.rho_j) * fma(quadratic, mu, fma(linear, p.c_j, linear * p.c_i));
     }
 };
 
