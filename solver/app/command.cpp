@@ -1,5 +1,4 @@
 #include "solver/app/command.hpp"
-#include "io/file.hpp"
 #include "solver/core/simd.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -22,6 +21,13 @@ Scene SceneArguments::read(const Comm& comm) const
     io::on_root(comm, [&] { text = io::read_scene_text(file); });
     text = comm.broadcast(text);
     return io::parse_scene(text, file, sets, force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce);
+}
+
+io::Path SceneArguments::results(const Scene& scene, const std::string& asked) const
+{
+    if (!asked.empty()) return asked;
+    if (!scene.output.directory.empty()) return scene.output.directory;
+    return io::Path("results") / io::Path(file).stem();
 }
 
 std::string version() { return KUZURE_VERSION; }
