@@ -8,7 +8,7 @@
 
 Finished points are not run again: call it again after an interruption, or when batch jobs have ended. Leaves in DIR (default
 results/sweeps/NAME): points.csv, report.md, efficiency.svg/png, losses.svg/png, and every run's own directory.
-Exit codes as kuzure's: 0, 2 the sweep is wrong, 4 a run failed."""
+Exit codes as kuzure's: 0, 2 the sweep is wrong, 3 layouts of the same soil ended with different bits, 4 a run failed."""
 import argparse, csv, difflib, json, math, os, shutil, statistics, subprocess, sys, tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))

@@ -149,16 +149,23 @@ try:
     check(killed >= 2, f"node2 is dead: {killed} processes")
     wait(job, 120, until=lambda: " PD " in slurm("squeue", "-h", "-j", job))
     check("PD" in slurm("squeue", "-h", "-o", "%t", "-j", job), "Slurm has put the job back into the queue")
-    subprocess.run(["bash", os.path.join(here, "vcluster.sh"), "on", "2", "slurmd", "-f", os.environ["SLURM_CONF"], "-N", "node2"], timeout=60)
+    # It comes back as a node that was switched on does: with an empty /tmp (PMIx keeps a folder a job there) and no job of old.
+    slurm_home = os.path.dirname(os.environ["SLURM_CONF"])
+    for name in os.listdir(os.path.join(slurm_home, "tmp/node2")):
+        shutil.rmtree(os.path.join(slurm_home, "tmp/node2", name), ignore_errors=True)
+    subprocess.run(["bash", os.path.join(here, "vcluster.sh"), "on", "2", "slurmd", "-c", "-f", os.environ["SLURM_CONF"], "-N", "node2"], timeout=60)
     slurm("scontrol", "update", "nodename=node2", "state=resume")
     wait(job, 900)
     text = log(job)
     check(text.count("going on from") >= 1, f"it goes on from the checkpoint {'' if 'going on from' in text else text[-2000:]}")
     check(summary("dying").get("state_hash") == want, "state_hash as undisturbed")
 finally:
+    if failures and "SLURM_CONF" in os.environ:
+        logs = os.path.join(os.path.dirname(os.environ["SLURM_CONF"]), "log")
+        shutil.copytree(logs, os.path.join(work, "slurm logs"), dirs_exist_ok=True)
     cluster("down")
     if not failures:
-        shutil.rmtree(work)
+        shutil.rmtree(work, ignore_errors=True)
     else:
         print(f"left for inspection: {work}")
 print(f"{len(failures)} failures")
