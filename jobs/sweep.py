@@ -278,10 +278,16 @@ set key outside right top Left reverse samplen 2
 
 def draw(rows, out):
     series = list(dict.fromkeys(r["series"] for r in rows))
-    data = "".join(f"${'s' + str(k)} << EOD\n" + "".join(f"{r['cores']} {r['efficiency']} \"{r['ranks']}x{r['threads']}\"\n" for r in sorted(
-        (r for r in rows if r["series"] == s), key=lambda r: (r["cores"], r["ranks"]))) + "EOD\n" for k, s in enumerate(series))
-    lines = ", ".join(f"$s{k} using 1:2 with linespoints pt 7 lc rgb '{COLOURS[k % len(COLOURS)]}' title \"{s}\" noenhanced, "
-                      f"$s{k} using 1:2:3 with labels offset 0,1 font ',9' notitle" for k, s in enumerate(series))
+    block = lambda name, chosen: f"${name} << EOD\n" + "".join(f"{r['cores']} {r['efficiency']} \"{r['ranks']}x{r['threads']}\"\n" for r in chosen) + "EOD\n"
+    data, lines = "", []
+    for k, s in enumerate(series):
+        mine = sorted((r for r in rows if r["series"] == s), key=lambda r: (r["cores"], r["efficiency"]))
+        best = list({r["cores"]: r for r in mine}.values())  # the line joins the best layouts
+        data += block(f"s{k}", mine) + block(f"b{k}", best)
+        colour = f"lc rgb '{COLOURS[k % len(COLOURS)]}'"
+        lines.append(f"$b{k} using 1:2 with lines {colour} notitle, $s{k} using 1:2 with points pt 7 {colour} title \"{s}\" noenhanced, "
+                     f"$s{k} using 1:2:3 with labels offset 0,1 font ',9' notitle")
+    lines = ", ".join(lines)
     top = max(1.0, max(r["efficiency"] for r in rows)) + 0.1
     plot(out, "efficiency", f"{data}set logscale x 2\nset xrange [{0.7 * min(r['cores'] for r in rows)}:{1.4 * max(r['cores'] for r in rows)}]\n"
          f"set yrange [0:{top}]\nset xlabel 'cores (labels: ranks x threads)'\nset ylabel 'efficiency of a core'\nplot 1 lc rgb '#b0b0b0' notitle, {lines}\n")

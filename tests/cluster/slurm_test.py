@@ -109,28 +109,25 @@ try:
     with open(os.path.join(work, "two.toml"), "w") as f:
         f.write(profile)
 
-    # How long it takes undisturbed; the clock limits follow from that, so that any machine meets them.
+    # 1: the clock. 24 s a job, 8 kept: more than one job, if the run is long enough; on a machine that is too fast it is made longer.
     end = 0.05
-    while True:
+    for trial in range(6):
         with open(os.path.join(work, "scene.toml"), "w") as f:
             f.write(SCENE % end)
-        begin = time.time()
-        subprocess.run([program, "run", "scene.toml", "-o", "undisturbed", "--threads", "2", "--quiet", "--force"], cwd=work, timeout=600, check=True, capture_output=True)
-        if time.time() - begin > 20:
+        out = f"clocked{trial}"
+        job = submit(out, "0.4", 2)
+        wait(job, 900)
+        if "job: back into the queue" in log(job):
             break
-        end *= max(2.0, 25 / (time.time() - begin))
+        end *= 3
+    subprocess.run([program, "run", "scene.toml", "-o", "undisturbed", "--threads", "1", "--quiet"], cwd=work, timeout=900, check=True, capture_output=True)
     want = summary("undisturbed")["state_hash"]
-    print(f"undisturbed: {summary('undisturbed')['steps']} steps in {time.time() - begin:.1f} s", flush=True)
-
-    # 1: the clock. 24 s a job, 8 kept: more than one job.
-    job = submit("clocked", "0.4", 2)
-    wait(job, 900)
     text = log(job)
-    check(summary("clocked").get("status") == "finished", f"the clock-limited job ran to its end {'' if summary('clocked').get('status') == 'finished' else text[-2000:]}")
+    check(summary(out).get("status") == "finished", f"the clock-limited job ran to its end {'' if summary('clocked').get('status') == 'finished' else text[-2000:]}")
     check(text.count("job: back into the queue") >= 1, f"it went back into the queue {text.count('job: back into the queue')} times")
     check("going on from" in text, "and on from its checkpoint")
-    check(summary("clocked").get("ranks") == 4, f"on 4 ranks: {summary('clocked').get('ranks')}")
-    check(summary("clocked").get("state_hash") == want, "state_hash as undisturbed")
+    check(summary(out).get("ranks") == 4, f"on 4 ranks: {summary('clocked').get('ranks')}")
+    check(summary(out).get("state_hash") == want, "state_hash as undisturbed")
 
     # 2: a node dies. Its daemon and every process in its namespace are killed, Slurm is told; the job comes back when it is up again.
     job = submit("dying", "30", 2)
@@ -149,10 +146,14 @@ try:
     check(killed >= 2, f"node2 is dead: {killed} processes")
     wait(job, 120, until=lambda: " PD " in slurm("squeue", "-h", "-j", job))
     check("PD" in slurm("squeue", "-h", "-o", "%t", "-j", job), "Slurm has put the job back into the queue")
-    # It comes back as a node that was switched on does: with an empty /tmp (PMIx keeps a folder a job there) and no job of old.
+    # It comes back as a node that was switched on does: with an empty /tmp (PMIx keeps a folder a job there). Slurm's spool
+    # keeps a socket of the killed step, which its PMIx would trip over if the step has the same number again, as it has here.
     slurm_home = os.path.dirname(os.environ["SLURM_CONF"])
     for name in os.listdir(os.path.join(slurm_home, "tmp/node2")):
         shutil.rmtree(os.path.join(slurm_home, "tmp/node2", name), ignore_errors=True)
+    for name in os.listdir(os.path.join(slurm_home, "spool/node2")):
+        if name.startswith("stepd.slurm.pmix"):
+            os.remove(os.path.join(slurm_home, "spool/node2", name))
     subprocess.run(["bash", os.path.join(here, "vcluster.sh"), "on", "2", "slurmd", "-c", "-f", os.environ["SLURM_CONF"], "-N", "node2"], timeout=60)
     slurm("scontrol", "update", "nodename=node2", "state=resume")
     wait(job, 900)
