@@ -74,7 +74,7 @@ WANTED = {  # what must stand in the script of 2 nodes, by profile and mode
     ("wisteria-o", ""): ["#PJM -L rscgrp=regular-o", "#PJM --mpi proc=8", "#PJM --omp thread=12", "mpiexec -n 8 \"$program\""],
     ("fugaku", ""): ["#PJM -L rscgrp=small", "#PJM -x PJM_LLIO_GFSCACHE=/vol0004", "pjsub --step --sparam \"jid=$id,sd=ec!=5:all\""],
     ("slurm", ""): ["#SBATCH --nodes=2", "#SBATCH --ntasks-per-node=2", "#SBATCH --cpus-per-task=24", "#SBATCH --requeue", "#SBATCH --account=gz00",
-                    "scontrol requeue \"$SLURM_JOB_ID\"", "srun --cpu-bind=cores --wait=60 \"$program\""],
+                    "scontrol requeue \"$SLURM_JOB_ID\"", "srun --cpus-per-task=24 --cpu-bind=cores --wait=60 \"$program\""],
     ("here", ""): ["mpirun -n 1 \"$program\""],
 }
 profiles = sorted(os.path.basename(f)[:-5] for f in glob.glob(os.path.join(root, "jobs/machines/*.toml")))

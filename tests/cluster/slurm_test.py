@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """kuzure job in a real Slurm on two virtual nodes: a clock-limited job requeues itself until it is done, and a job whose node
 dies goes on elsewhere, both with the bits of an undisturbed run. Exit 77 (not run) without root, Slurm or network namespaces."""
-import json, os, re, shutil, subprocess, sys, tempfile, time
+import glob, json, os, re, shutil, subprocess, sys, tempfile, time
 
 program = os.path.abspath(sys.argv[1])
 here = os.path.dirname(os.path.abspath(__file__))
@@ -123,10 +123,10 @@ try:
     subprocess.run([program, "run", "scene.toml", "-o", "undisturbed", "--threads", "1", "--quiet"], cwd=work, timeout=900, check=True, capture_output=True)
     want = summary("undisturbed")["state_hash"]
     text = log(job)
-    check(summary(out).get("status") == "finished", f"the clock-limited job ran to its end {'' if summary('clocked').get('status') == 'finished' else text[-2000:]}")
+    check(summary(out).get("status") == "finished", f"the clock-limited job ran to its end {'' if summary(out).get('status') == 'finished' else text[-2000:]}")
     check(text.count("job: back into the queue") >= 1, f"it went back into the queue {text.count('job: back into the queue')} times")
     check("going on from" in text, "and on from its checkpoint")
-    check(summary(out).get("ranks") == 4, f"on 4 ranks: {summary('clocked').get('ranks')}")
+    check(summary(out).get("ranks") == 4, f"on 4 ranks: {summary(out).get('ranks')}")
     check(summary(out).get("state_hash") == want, "state_hash as undisturbed")
 
     # 2: a node dies. Its daemon and every process in its namespace are killed, Slurm is told; the job comes back when it is up again.
@@ -146,14 +146,11 @@ try:
     check(killed >= 2, f"node2 is dead: {killed} processes")
     wait(job, 120, until=lambda: " PD " in slurm("squeue", "-h", "-j", job))
     check("PD" in slurm("squeue", "-h", "-o", "%t", "-j", job), "Slurm has put the job back into the queue")
-    # It comes back as a node that was switched on does: with an empty /tmp (PMIx keeps a folder a job there). Slurm's spool
-    # keeps a socket of the killed step, which its PMIx would trip over if the step has the same number again, as it has here.
+    # It comes back as a node that was switched on does: nothing in /tmp, and none of the killed step's PMIx in Slurm's spool,
+    # over which the same step of the requeued job would trip (Slurm 22.05).
     slurm_home = os.path.dirname(os.environ["SLURM_CONF"])
-    for name in os.listdir(os.path.join(slurm_home, "tmp/node2")):
-        shutil.rmtree(os.path.join(slurm_home, "tmp/node2", name), ignore_errors=True)
-    for name in os.listdir(os.path.join(slurm_home, "spool/node2")):
-        if name.startswith("stepd.slurm.pmix"):
-            os.remove(os.path.join(slurm_home, "spool/node2", name))
+    for left in glob.glob(os.path.join(slurm_home, "tmp/node2/*")) + glob.glob(os.path.join(slurm_home, "spool/node2/*pmix*")):
+        shutil.rmtree(left) if os.path.isdir(left) else os.remove(left)
     subprocess.run(["bash", os.path.join(here, "vcluster.sh"), "on", "2", "slurmd", "-c", "-f", os.environ["SLURM_CONF"], "-N", "node2"], timeout=60)
     slurm("scontrol", "update", "nodename=node2", "state=resume")
     wait(job, 900)

@@ -152,7 +152,7 @@ Plan make_plan(const Comm& comm, const Arguments& a)
 
     p.predicted = predict_seconds(e, m, p.nodes, p.per_node);
     // Outputs go through one file system: half a gigabyte a second is what a modest one takes.
-    const double writing = 0.5e9, start = 60;
+    const double writing = 0.5e9, start = 10;
     const double whole = 1.5 * p.predicted + e.disk() / writing + start;
     const double most = p.queue ? 60 * p.queue->minutes : 0;
     if (a.minutes > 0) p.limit = int(std::lround(60 * a.minutes));
