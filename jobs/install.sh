@@ -2,6 +2,7 @@
 # Install what kuzure needs (Debian 12 or later, Ubuntu 24.04 or later): as root, or with a sudo that asks no password.
 #   jobs/install.sh          to build and run
 #   jobs/install.sh tests    also what only the test suite needs
+#   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
 
@@ -11,13 +12,15 @@ libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlpl
 scripts=(python3 python3-h5py python3-numpy)
 command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
 tests=(clang-format valgrind binutils)
+cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
 case "${1-}" in
 "") ;;
 tests) packages+=("${tests[@]}") ;;
+cluster) packages+=("${tests[@]}" "${cluster[@]}") ;;
 *)
-    echo "usage: jobs/install.sh [tests]" >&2
+    echo "usage: jobs/install.sh [tests|cluster]" >&2
     exit 2
     ;;
 esac

@@ -1,5 +1,4 @@
 #include "solver/app/command.hpp"
-#include "io/file.hpp"
 #include "solver/core/simd.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -24,6 +23,13 @@ Scene SceneArguments::read(const Comm& comm) const
     return io::parse_scene(text, file, sets, force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce);
 }
 
+io::Path SceneArguments::results(const Scene& scene, const std::string& asked) const
+{
+    if (!asked.empty()) return asked;
+    if (!scene.output.directory.empty()) return scene.output.directory;
+    return io::Path("results") / io::Path(file).stem();
+}
+
 std::string version() { return KUZURE_VERSION; }
 
 std::string version_text()
@@ -31,13 +37,17 @@ std::string version_text()
     return fmt::format("kuzure {} ({}), GCC {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, __VERSION__, instruction_set(), _OPENMP);
 }
 
+int cores_here()
+{
+    cpu_set_t cpus;
+    return sched_getaffinity(0, sizeof cpus, &cpus) == 0 ? CPU_COUNT(&cpus) : omp_get_num_procs();
+}
+
 int use_threads(const Comm& comm, int threads)
 {
     if (threads <= 0) {
-        cpu_set_t cpus;
-        const int cores = sched_getaffinity(0, sizeof cpus, &cpus) == 0 ? CPU_COUNT(&cpus) : omp_get_num_procs();
         const char* asked = std::getenv("OMP_NUM_THREADS");
-        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores / comm.node_place().size);
+        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores_here() / comm.node_place().size);
     }
     omp_set_num_threads(threads);
     return threads;

@@ -1,6 +1,7 @@
 #pragma once
 // What the commands share: the team, the scene given on the command line, and how they are registered.
 #include "decomposition/comm.hpp"
+#include "io/file.hpp"
 #include "io/scene_file.hpp"
 #include <functional>
 #include <string>
@@ -23,6 +24,8 @@ struct SceneArguments {
     void add_to(CLI::App&);
     /// Collective: rank 0 reads the file, every rank parses. Throws BadInput on all ranks.
     Scene read(const Comm&) const;
+    /// Where the results go: the directory asked for, or the scene's, or results/<scene file's name>.
+    io::Path results(const Scene&, const std::string& asked) const;
 };
 
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
@@ -31,10 +34,14 @@ void add_run(CLI::App&, Action& chosen);
 void add_check(CLI::App&, Action& chosen);
 void add_reference(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
+void add_job(CLI::App&, Action& chosen);
 
 /// "0.1.0", and a text with git hash, compiler, instruction set and packages.
 std::string version();
 std::string version_text();
+
+/// The cores this process may use.
+int cores_here();
 
 /// Use this many threads (0: the cores of this node shared evenly by its ranks); gives the number. Collective.
 int use_threads(const Comm&, int threads);

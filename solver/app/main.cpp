@@ -17,6 +17,7 @@ int main(int argc, char** argv)
     add_run(app, chosen);
     add_check(app, chosen);
     add_report(app, chosen);
+    add_job(app, chosen);
     add_reference(app, chosen);
 #if defined(KUZURE_TRAP_FPE)
     feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);

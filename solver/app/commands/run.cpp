@@ -95,7 +95,7 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::
 /// One line on the terminal, or plain lines at intervals in a log.
 class Progress {
 public:
-    Progress(bool speaks, double end) : speaks_(speaks), bar_(isatty(1) != 0), end_(end), start_(now()), last_(start_) {}
+    Progress(bool speaks, double end) : speaks_(speaks), bar_(terminal()), end_(end), start_(now()), last_(start_) {}
     void show(const Simulation& sim, double residual, bool final = false)
     {
         if (!speaks_) return;
@@ -118,6 +118,12 @@ public:
     void from(const Simulation& sim) { first_step_ = sim.steps(), first_time_ = sim.time(); }
 
 private:
+    /// mpirun's ranks always write to a pseudo-terminal; who sends that into a file says TERM=dumb.
+    static bool terminal()
+    {
+        const char* kind = std::getenv("TERM");
+        return isatty(1) != 0 && kind && std::string_view(kind) != "dumb";
+    }
     bool speaks_, bar_;
     double end_, start_, last_;
     std::int64_t first_step_ = 0;
@@ -148,9 +154,7 @@ private:
     {
         for (const auto& issue : scene::check(scene_, args_.scene.force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
             if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}: {}\n", issue.key, issue.text);
-        io::Path where = args_.output;
-        if (where.empty()) where = scene_.output.directory;
-        if (where.empty()) where = io::Path("results") / io::Path(args_.scene.file).stem();
+        const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
         if (args_.restart) {
             if (!args_.restart->empty()) from = io::verify_checkpoint(comm_, *args_.restart);
