@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Fuzzing of the scene reader and the checkpoint reader with libFuzzer, ASan and UBSan (docs/reliability.md). Needs clang, which
+# jobs/install.sh does not install: apt-get install clang libclang-rt-dev
+#   tests/fuzz.sh scene|checkpoint EXECUTIONS   so many more; corpus and logs in build/fuzz/, which grow from run to run
+#   tests/fuzz.sh count                         executions of all runs so far, by their logs; those that go on count too
+# A finding ends the run with 1 and lies in build/fuzz/findings; mend it and keep it as a seed in tests/fuzz/corpus.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+logs=build/fuzz/logs
+case ${1-} in
+count)
+    for what in scene checkpoint; do
+        total=0
+        for log in "$logs/$what".*; do
+            [ -f "$log" ] || continue
+            n=$(grep -ao '^#[0-9]*' "$log" | tail -n 1 | tr -d '#')
+            total=$((total + ${n:-0}))
+        done
+        echo "$what: $total executions, $(find "$logs" -name "$what.*" 2>/dev/null | wc -l) runs," \
+            "$(grep -aoh 'cov: [0-9]*' "$logs/$what".* 2>/dev/null | sort -k2n | tail -n 1 | tr -dc 0-9) edges," \
+            "$(find build/fuzz/findings -name "$what-*" 2>/dev/null | wc -l) findings"
+    done
+    exit
+    ;;
+scene) options=(-max_len=1600 -dict=tests/fuzz/scene.dict) ;;
+checkpoint) options=(-max_len=12000) ;;
+*)
+    sed -n '2,7s/^# \{0,1\}//p' "$0" >&2
+    exit 2
+    ;;
+esac
+what=$1
+runs=${2:?how many executions}
+command -v clang++ >/dev/null || { echo "clang is missing: apt-get install clang libclang-rt-dev" >&2; exit 1; }
+jobs/build.sh fuzz scene_fuzz checkpoint_fuzz
+mkdir -p build/fuzz/corpus/$what build/fuzz/findings "$logs"
+# What is freed is kept from use for 8 MB, more than an input takes; of the stack at each allocation one frame is kept: findings
+# are looked at again with all of them.
+export ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=8:malloc_context_size=1
+log=$logs/$what.$(date +%s)
+echo "running; log in $log"
+build/fuzz/tests/${what}_fuzz -runs="$runs" -timeout=10 -rss_limit_mb=1500 -print_final_stats=1 "${options[@]}" \
+    -artifact_prefix=build/fuzz/findings/$what- build/fuzz/corpus/$what tests/fuzz/corpus/$what >"$log" 2>&1 ||
+    { tail -n 40 "$log" >&2; exit 1; }
+tail -n 8 "$log"
