@@ -13,12 +13,13 @@ namespace {
 const std::size_t largest_file = std::size_t(1) << 20;
 const std::size_t most_problems = 20;
 
-std::vector<std::string> split(std::string_view path)
+/// The parts of a path between its dots; they point into it.
+std::vector<std::string_view> split(std::string_view path)
 {
-    std::vector<std::string> parts;
+    std::vector<std::string_view> parts;
     for (std::size_t at = 0; at <= path.size();) {
         const auto end = std::min(path.find('.', at), path.size());
-        parts.emplace_back(path.substr(at, end - at));
+        parts.push_back(path.substr(at, end - at));
         at = end + 1;
     }
     return parts;
@@ -388,6 +389,17 @@ void Document::complain_unknown(const std::string& path, std::string_view leaf, 
                                fmt::join(siblings, ", ")));
 }
 
+namespace {
+/// The default of a key that has one; every text is parsed once.
+const toml::node& fallback(const Key& key)
+{
+    thread_local std::unordered_map<std::string, toml::table> parsed;
+    auto found = parsed.find(key.fallback);
+    if (found == parsed.end()) found = parsed.emplace(key.fallback, toml::parse("v = " + key.fallback)).first;
+    return *found->second.get("v");
+}
+} // namespace
+
 /// Checks a table against the rows of its pattern and fills in defaults.
 void Document::check_table(toml::table& table, const std::string& path, const Rule& rule)
 {
@@ -404,8 +416,7 @@ void Document::check_table(toml::table& table, const std::string& path, const Ru
         if (!table.contains(key->leaf())) {
             if (key->need == Need::Required) complain(here, fmt::format("expected {}, found nothing; {}", key->expected(), remedy));
             if (key->need != Need::Default) continue;
-            auto fallback = toml::parse("v = " + key->fallback);
-            table.insert(key->leaf(), *fallback.get("v"));
+            table.insert(key->leaf(), fallback(*key));
         }
         toml::node& node = *table.get(key->leaf());
         if (const auto wrong = mismatch(*key, node)) {

@@ -289,6 +289,7 @@ bool H5Reader::has(const std::string& name) const
 
 H5Reader::Table H5Reader::table(const std::string& name) const
 {
+    if (const auto seen = seen_.find(name); seen != seen_.end()) return seen->second;
     if (!has(name)) refuse(fmt::format("table {} is missing: not a file of this kind, or damaged", name));
     const Handle data(H5Dopen2(id_, name.c_str(), H5P_DEFAULT), H5Dclose);
     if (!data.ok()) refuse(fmt::format("table {} is damaged (HDF5: {})", name, last_complaint().words));
@@ -312,6 +313,7 @@ H5Reader::Table H5Reader::table(const std::string& name) const
     const auto layout = H5Pget_layout(create);
     const bool ours = layout == H5D_CONTIGUOUS && H5Pget_external_count(create) == 0;
     if (!ours) refuse(fmt::format("table {} is stored in a way kuzure does not write", name));
+    seen_.emplace(name, t);
     return t;
 }
 

@@ -2,6 +2,7 @@
 // HDF5 as the rest of io/ needs it: tables of rows written by all ranks together and read by one at a time,
 // every failure an IoFailed in words. No HDF5 type shows here, and the library never prints.
 #include "io/file.hpp"
+#include <map>
 #include <vector>
 
 namespace kuzure::io {
@@ -99,6 +100,7 @@ private:
     Path file_;
     std::int64_t id_ = -1;
     std::uint64_t file_bytes_ = 0;
+    mutable std::map<std::string, Table> seen_; // tables that were looked at and found in order
 };
 
 } // namespace kuzure::io

@@ -53,10 +53,20 @@ std::string Key::expected() const
     return {};
 }
 
+KeyTable::KeyTable(std::string file, std::vector<Key> keys) : file_(std::move(file)), keys_(std::move(keys))
+{
+    for (const Key& k : keys_) {
+        rows_.emplace(k.path, &k);
+        const auto dot = k.path.rfind('.');
+        const auto parent = std::string_view(k.path).substr(0, dot == k.path.npos ? 0 : dot);
+        if (k.leaf() != "*") inside_[parent].push_back(&k);
+    }
+}
+
 const Key* KeyTable::row(std::string_view pattern) const
 {
-    const auto found = std::find_if(keys_.begin(), keys_.end(), [&](const Key& k) { return k.path == pattern; });
-    return found == keys_.end() ? nullptr : &*found;
+    const auto found = rows_.find(pattern);
+    return found == rows_.end() ? nullptr : found->second;
 }
 
 const Key* KeyTable::find(std::string_view path) const { return row(pattern_of(path)); }
@@ -71,28 +81,29 @@ std::string KeyTable::pattern_of(std::string_view path) const
     return std::string(head) + ".*" + std::string(second == path.npos ? "" : path.substr(second));
 }
 
-std::vector<const Key*> KeyTable::inside(std::string_view pattern) const
+const std::vector<const Key*>& KeyTable::inside(std::string_view pattern) const
 {
-    const std::string head = pattern.empty() ? "" : std::string(pattern) + ".";
-    std::vector<const Key*> inside;
-    for (const Key& k : keys_)
-        if (k.path.starts_with(head) && k.path.find('.', head.size()) == k.path.npos && k.leaf() != "*") inside.push_back(&k);
-    return inside;
+    static const std::vector<const Key*> none;
+    const auto found = inside_.find(pattern);
+    return found == inside_.end() ? none : found->second;
 }
 
 int edit_distance(std::string_view a, std::string_view b)
 {
-    std::vector<std::vector<int>> d(a.size() + 1, std::vector<int>(b.size() + 1));
-    for (std::size_t i = 0; i <= a.size(); ++i)
-        for (std::size_t j = 0; j <= b.size(); ++j) {
-            if (i == 0 || j == 0) {
-                d[i][j] = int(i + j);
-                continue;
-            }
-            d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+    // Of the table of distances between the beginnings of both words, the row of this letter of a and the two before.
+    std::vector<int> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) now[j] = int(j);
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::swap(before, last);
+        std::swap(last, now);
+        now[0] = int(i);
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const int same = last[j - 1] + int(a[i - 1] != b[j - 1]);
+            now[j] = std::min(std::min(last[j], now[j - 1]) + 1, same);
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
         }
-    return d[a.size()][b.size()];
+    }
+    return now[b.size()];
 }
 
 std::string nearest(std::string_view written, const std::vector<std::string>& known)
@@ -104,11 +115,13 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
         {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}};
     for (const auto& [other, ours] : others)
         if (written == other && std::find(known.begin(), known.end(), ours) != known.end()) return std::string(ours);
-    // A very long word is near to nothing, and the table of distances would be large.
+    // A very long word is near to nothing, and its distances would take long.
     const auto word = written.substr(0, 100);
-    const auto best = std::min_element(known.begin(), known.end(),
-                                       [&](const auto& a, const auto& b) { return edit_distance(word, a) < edit_distance(word, b); });
-    return best == known.end() ? "" : *best;
+    const std::string* best = nullptr;
+    int least = 0;
+    for (const auto& candidate : known)
+        if (const int distance = edit_distance(word, candidate); !best || distance < least) best = &candidate, least = distance;
+    return best ? *best : "";
 }
 
 } // namespace kuzure::io

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 namespace kuzure::io {
@@ -59,7 +60,9 @@ struct Key {
 class KeyTable {
 public:
     /// `file`: "a scene", as messages call it. All keys, parents before children.
-    KeyTable(std::string file, std::vector<Key> keys) : file_(std::move(file)), keys_(std::move(keys)) {}
+    KeyTable(std::string file, std::vector<Key> keys);
+    KeyTable(const KeyTable&) = delete;
+    KeyTable& operator=(const KeyTable&) = delete;
     const std::string& file() const { return file_; }
     auto begin() const { return keys_.begin(); }
     auto end() const { return keys_.end(); }
@@ -68,13 +71,15 @@ public:
     const Key* find(std::string_view path) const;
     /// The pattern of a path: "soil.sand.density" gives "soil.*.density".
     std::string pattern_of(std::string_view path) const;
-    /// Names of the keys directly inside a table of this pattern; the top level is "".
-    std::vector<const Key*> inside(std::string_view pattern) const;
+    /// The keys directly inside a table of this pattern; the top level is "".
+    const std::vector<const Key*>& inside(std::string_view pattern) const;
 
 private:
     const Key* row(std::string_view pattern) const;
     std::string file_;
     std::vector<Key> keys_;
+    std::unordered_map<std::string_view, const Key*> rows_;                // by pattern
+    std::unordered_map<std::string_view, std::vector<const Key*>> inside_; // by pattern of the parent
 };
 
 /// Edits (insert, delete, replace, exchange two neighbours) that lead from one word to the other.

@@ -3,6 +3,10 @@
 #include "solver/kernels/variants.hpp"
 #include "solver/scene/scene.hpp"
 
+#ifndef KUZURE_FIRST_VARIANT
+#define KUZURE_FIRST_VARIANT 0 // CMakeLists.txt: a build may leave out the first, quick ones
+#endif
+
 namespace kuzure {
 
 template <int I> std::unique_ptr<PairModel> make_variant(const scene::Interactions&, Arithmetic); // variant.cpp
@@ -18,7 +22,10 @@ template <int I> std::unique_ptr<PairModel> first_that_covers(const scene::Inter
 }
 } // namespace
 
-std::unique_ptr<PairModel> choose_model(const scene::Interactions& s, Arithmetic a) { return first_that_covers<0>(s, a); }
+std::unique_ptr<PairModel> choose_model(const scene::Interactions& s, Arithmetic a)
+{
+    return first_that_covers<KUZURE_FIRST_VARIANT>(s, a);
+}
 std::unique_ptr<PairModel> choose_model(const Scene& s, Arithmetic a) { return choose_model(s.interactions(), a); }
 
 } // namespace kuzure
