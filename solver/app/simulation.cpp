@@ -239,7 +239,7 @@ Wishes Simulation::step(Wishes mine)
     ensure(dt > 0, "a finished run was asked for another step");
     if (outgrown()) {
         rebuild(true);
-        inspect();
+        if (options_.guard) inspect();
     }
     forces_.damping = 0;
     if (const auto& d = scene_.effects.damping; d && clock_.time < d->until) {

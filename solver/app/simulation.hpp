@@ -19,6 +19,7 @@ struct RunOptions {
     Arithmetic arithmetic = Arithmetic::Lanes;
     int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
     int blocks_per_rank = 50;
+    bool guard = true; // look for trouble at list rebuilds; perf/bench/guard.cpp measures what it costs
     /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say. Velocity, density and
     /// stress have half-step twins, which must be set alike.
     std::function<void(Particles&)> initial = {};
