@@ -30,6 +30,7 @@ using Action = std::function<Exit(const Comm&)>;
 void add_run(CLI::App&, Action& chosen);
 void add_check(CLI::App&, Action& chosen);
 void add_reference(CLI::App&, Action& chosen);
+void add_scale(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
 
 /// "0.1.0", and a text with git hash, compiler, instruction set and packages.

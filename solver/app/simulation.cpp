@@ -1,6 +1,7 @@
 #include "solver/app/simulation.hpp"
 #include "solver/app/guard.hpp"
 #include "solver/app/initial_stress.hpp"
+#include "solver/app/scaling.hpp"
 #include "solver/scene/check.hpp"
 #include <fmt/format.h>
 #include <limits>
@@ -10,40 +11,6 @@
 namespace kuzure {
 
 namespace {
-
-/// Edge of the blocks: about `per_rank` blocks of soil a rank, whole numbers of them on periodic axes.
-Vector block_size(const Scene& s, const scene::Filling& f, int ranks, int per_rank)
-{
-    const double dx = s.space.spacing;
-    const double particles = double(f.soil_count()) / (double(ranks) * per_rank);
-    double edge = std::max(3.0, s.dimensions == 3 ? std::cbrt(particles) : std::sqrt(particles)) * dx;
-    if (ranks == 1) edge = 1e3 * edge;
-    Vector size{edge, edge, edge};
-    const auto fit = [&](int axis, double lo, double hi, double& e) {
-        if (s.space.periodic[axis]) e = (hi - lo) / std::max(1.0, std::floor((hi - lo) / e));
-    };
-    if (s.space.low) {
-        fit(0, s.space.low->x, s.space.high->x, size.x);
-        fit(1, s.space.low->y, s.space.high->y, size.y);
-        fit(2, s.space.low->z, s.space.high->z, size.z);
-    }
-    return size;
-}
-Vector low_corner(const scene::Filling& f, const Scene& s)
-{
-    const double half = 0.5 * s.space.spacing;
-    const auto& b = f.soil_bounds();
-    return {b.low.x - half, s.dimensions == 3 ? b.low.y - half : -half, b.low.z - half};
-}
-Vector domain_origin(const scene::Filling& f, const Scene& s)
-{
-    Vector o = low_corner(f, s);
-    if (s.space.periodic[0]) o.x = s.space.low->x;
-    if (s.space.periodic[1]) o.y = s.space.low->y;
-    if (s.space.periodic[2]) o.z = s.space.low->z;
-    return o;
-}
-Vector period(const Scene& s) { return s.space.low && s.space.high ? *s.space.high - *s.space.low : Vector{1, 1, 1}; }
 
 template <class T> Record<T> far_away()
 {
@@ -59,8 +26,7 @@ template <class T> Record<T> far_away()
 Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
-              scene.space.low.value_or(Vector{}), period(scene)),
+      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)),
       buffers_(Buffers<double>(scene.smoothing_length()))
 {
     timers_.timed(Phase::Setup, [&] {
@@ -86,8 +52,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
 Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
-              scene.space.low.value_or(Vector{}), period(scene)),
+      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)),
       particles_(std::move(particles)), buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
 {
     timers_.timed(Phase::Setup, [&] {
@@ -111,7 +76,7 @@ void Simulation::prepare()
     const bool mixed = model_->precision() == scene::Precision::Mixed;
     if (mixed) buffers_ = Buffers<float>(scene_.smoothing_length());
     for (const auto& s : scene_.soils) soils_.push_back(Material::from(s));
-    reach_ = scene_.support() * (1 + scene_.accuracy.skin);
+    reach_ = list_reach(scene_);
     skin_ = scene_.support() * scene_.accuracy.skin;
     forces_.gravity = scene_.effects.gravity.value_or(Vector{});
     water_ = PoreWater::from(scene_.effects);
@@ -149,32 +114,14 @@ void Simulation::widen_energy_unit()
 
 void Simulation::cut_by_counts()
 {
-    // Each rank counts a share of the blocks; nobody makes a particle yet.
-    const auto& b = filling_.soil_bounds();
-    const Vector far = b.high;
-    const Block lo = domain_.block_of(b.low), hi = domain_.block_of(far);
-    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
-    std::vector<BlockWork> mine;
-    std::int64_t k = 0;
-    const auto edge = [&](double o, double s, std::int32_t i) { return o + s * i; };
-    for (auto x = lo[0]; x <= hi[0]; ++x)
-        for (auto y = lo[1]; y <= hi[1]; ++y)
-            for (auto z = lo[2]; z <= hi[2]; ++z, ++k) {
-                if (k % comm_.size() != comm_.rank()) continue;
-                const double inset = 1e-9 * scene_.space.spacing;
-                const scene::Box box{
-                    {edge(origin.x, size.x, x), edge(origin.y, size.y, y), edge(origin.z, size.z, z)},
-                    {edge(origin.x, size.x, x + 1) - inset, edge(origin.y, size.y, y + 1) - inset, edge(origin.z, size.z, z + 1) - inset}};
-                const double n = double(filling_.soil_count_in(box));
-                if (n > 0) mine.push_back({{x, y, z}, n, n});
-            }
+    // Each rank counts a share of the blocks; nobody keeps a particle yet.
+    const auto mine = weigh(StartSoil(scene_, filling_, domain_.space()), std::size_t(comm_.rank()), std::size_t(comm_.size())).listed;
     const auto report = timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes())}); });
     rebalance_ = Rebalance(report.imbalance, report.seconds);
 }
 
 void Simulation::fill()
 {
-    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
     struct Start {
         std::int64_t id;
         Vector x;
@@ -184,10 +131,7 @@ void Simulation::fill()
     for (std::size_t k = 0; k < domain_.blocks().size(); ++k) {
         if (domain_.owners()[k] != comm_.rank()) continue;
         const Block b = domain_.blocks()[k];
-        const double margin = 1e-6 * scene_.space.spacing;
-        const scene::Box box{
-            {origin.x + size.x * b[0] - margin, origin.y + size.y * b[1] - margin, origin.z + size.z * b[2] - margin},
-            {origin.x + size.x * (b[0] + 1) + margin, origin.y + size.y * (b[1] + 1) + margin, origin.z + size.z * (b[2] + 1) + margin}};
+        const scene::Box box = box_of(domain_.space(), b, 1e-6 * scene_.space.spacing);
         filling_.for_each_soil_in(box, [&](std::int64_t id, Vector x, int body) {
             if (domain_.block_of(x) == b) start.push_back({id, x, body});
         });

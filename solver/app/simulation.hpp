@@ -5,6 +5,7 @@
 #include "decomposition/rebalance.hpp"
 #include "perf/phases.hpp"
 #include "perf/report.hpp"
+#include "solver/app/blocks.hpp"
 #include "solver/app/energy.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/fill.hpp"
@@ -18,7 +19,7 @@ namespace kuzure {
 struct RunOptions {
     Arithmetic arithmetic = Arithmetic::Lanes;
     int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
-    int blocks_per_rank = 50;
+    int blocks_per_rank = default_blocks_per_rank;
     /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say. Velocity, density and
     /// stress have half-step twins, which must be set alike.
     std::function<void(Particles&)> initial = {};
