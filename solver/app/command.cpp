@@ -31,13 +31,17 @@ std::string version_text()
     return fmt::format("kuzure {} ({}), GCC {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, __VERSION__, instruction_set(), _OPENMP);
 }
 
+int cores_here()
+{
+    cpu_set_t cpus;
+    return sched_getaffinity(0, sizeof cpus, &cpus) == 0 ? CPU_COUNT(&cpus) : omp_get_num_procs();
+}
+
 int use_threads(const Comm& comm, int threads)
 {
     if (threads <= 0) {
-        cpu_set_t cpus;
-        const int cores = sched_getaffinity(0, sizeof cpus, &cpus) == 0 ? CPU_COUNT(&cpus) : omp_get_num_procs();
         const char* asked = std::getenv("OMP_NUM_THREADS");
-        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores / comm.node_place().size);
+        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores_here() / comm.node_place().size);
     }
     omp_set_num_threads(threads);
     return threads;

@@ -37,6 +37,9 @@ void add_report(CLI::App&, Action& chosen);
 std::string version();
 std::string version_text();
 
+/// The cores this process may use.
+int cores_here();
+
 /// Use this many threads (0: the cores of this node shared evenly by its ranks); gives the number. Collective.
 int use_threads(const Comm&, int threads);
 

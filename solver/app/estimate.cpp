@@ -26,7 +26,10 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const double k = 2 * s.space.h;
     const double neighbours = s.dimensions == 3 ? 4 * std::numbers::pi / 3 * k * k * k : std::numbers::pi * k * k;
     const bool mixed = model.precision() == scene::Precision::Mixed;
-    const double records = 2.0 * (mixed ? 64 : 128) * (model.tensile() ? 1.5 : 1.0);
+    e.mixed = mixed;
+    e.support = k;
+    e.record = (mixed ? 64 : 128) * (model.tensile() ? 1.5 : 1.0);
+    const double records = 2.0 * e.record;
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
     const double columns = scene::column_bytes(f);
