@@ -14,8 +14,9 @@ std::string lost_at(Vector x)
 }
 
 BlockSpace::BlockSpace(Vector origin, Vector size, std::array<bool, 3> periodic, Vector low, Vector length)
-    : origin_{origin.x, origin.y, origin.z}, size_{size.x, size.y, size.z}, period_low_{low.x, low.y, low.z},
-      period_length_{length.x, length.y, length.z}
+    : origin_{origin.x, origin.y, origin.z}, size_{size.x, size.y, size.z}, period_low_{low.x, low.y, low.z}, period_length_{length.x,
+                                                                                                                             length.y,
+                                                                                                                             length.z}
 {
     for (int a = 0; a < 3; ++a) {
         ensure(size_[a] > 0 && std::isfinite(size_[a]), "the size of a block is not positive");

@@ -49,7 +49,7 @@ int Domain::owner_of(const Block& asked) const
     if (block_.empty()) return 0;
     const Block b = space_.wrapped(asked);
     const auto& period = space_.period();
-    if (const int k = index_[b]; k >= 0) return owner_[k];
+    if (const int k = place_of(b); k >= 0) return owner_[k];
 
     // (largest difference, squared distance, lexicographic place): the least wins.
     using Rank = std::tuple<std::int64_t, std::int64_t, int>;
@@ -73,7 +73,7 @@ int Domain::owner_of(const Block& asked) const
                     const Block near = space_.wrapped({b[0] + i, b[1] + j, b[2] + l});
                     bool inside = true;
                     for (const auto c : near) inside = inside && c >= -block_limit && c < block_limit;
-                    const int k = inside ? index_[near] : -1;
+                    const int k = inside ? place_of(near) : -1;
                     if (k >= 0) best = std::min(best, rank_of(k));
                 }
     if (best == none)
@@ -83,7 +83,7 @@ int Domain::owner_of(const Block& asked) const
 
 // ---- cutting
 // -------------------------------------------------------------------------------------------------------
-CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo)
+CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo, Labels labels)
 {
     const double start = now();
     const auto lists = comm_.gather(std::as_bytes(mine));
@@ -99,6 +99,7 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
                 if (n) std::memcpy(&all[at], lists[r].data(), n * sizeof(BlockWork));
                 lister.resize(at + n, r);
             }
+            if (labels == Labels::Free) lister.clear();
             const auto [g, owner, r] = cut_blocks(all, lister, space_.grid(halo.reach, halo.row_bytes), comm_.size(), method);
             put(result, std::span<const char>());
             put(result, std::span<const Block>(g.block));
@@ -137,9 +138,6 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
     r.peers = take<int>(from);
     r.pieces = take<int>(from);
 
-    index_ = {};
-    index_.reserve(block_.size());
-    for (int b = 0; b < int(block_.size()); ++b) index_.set(block_[b], b);
     is_cut_ = true;
     r.seconds = comm_.max(now() - start);
     return r;

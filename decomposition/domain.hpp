@@ -15,6 +15,9 @@ struct HaloCost {
     double row_bytes = 128;
 };
 
+/// Whether a cut leaves a part's work with the rank that holds it, or nobody holds any yet.
+enum class Labels { Kept, Free };
+
 class Domain {
 public:
     /// Blocks of this size from this origin (m); on a periodic axis the period must hold a whole number of
@@ -29,9 +32,9 @@ public:
     Block block_of(Vector x) const { return space_.block_of(x); }
 
     /// Cuts anew; collective. `mine` lists what this rank's blocks cost; equal blocks of several ranks add
-    /// up. Labels stay with the rank that listed most of a part's work. The report is the same on every rank,
-    /// its seconds the longest of all ranks.
-    CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {});
+    /// up. Labels stay with the rank that listed most of a part's work, or are free (cut_blocks()). The report is the same
+    /// on every rank, its seconds the longest of all ranks.
+    CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {}, Labels = Labels::Kept);
 
     /// The same on every rank, for any block: where no soil was at the last cut, the owner of the nearest
     /// block that had some (largest difference of an axis, then distance, then lexicographic order). Throws
@@ -62,6 +65,13 @@ public:
     const BlockSpace& space() const { return space_; }
 
 private:
+    /// Place of a wrapped block in block_, or -1. A search, not a table: of all that a rank keeps, only this list grows with
+    /// the whole scene.
+    int place_of(const Block& b) const
+    {
+        const auto at = std::ranges::lower_bound(block_, b);
+        return at != block_.end() && *at == b ? int(at - block_.begin()) : -1;
+    }
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 
@@ -69,7 +79,6 @@ private:
     BlockSpace space_;
     std::vector<Block> block_;
     std::vector<int> owner_;
-    BlockIndex index_;
     bool is_cut_ = false;
 };
 

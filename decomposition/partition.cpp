@@ -360,7 +360,7 @@ void even_out(const BlockGraph& g, Cut& part, int parts, double target)
     std::vector<std::vector<int>> members(parts);
     std::vector<int> order(parts);
     std::vector<double> ties(parts, 0.0);
-    for (int pass = 0; pass < 40; ++pass) {
+    for (int pass = 0; pass < 100; ++pass) {
         if (*std::ranges::max_element(loads.work) <= target * mean) return;
         for (auto& m : members) m.clear();
         for (int b = 0; b < g.size(); ++b) members[part[b]].push_back(b);
@@ -429,6 +429,9 @@ void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<in
     for (int& p : part) p = label[p];
 }
 
+constexpr double good = 1.03; // imbalance below which only the halo counts
+constexpr double fair = 1.05; // imbalance that an evened out cut may keep
+
 Cut best_cut(const BlockGraph& g, int parts, Method method)
 {
     if (parts == 1) return Cut(g.size(), 0);
@@ -440,7 +443,6 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
     fill_empty_parts(g, best, parts);
     if (method == Method::Hilbert) return best;
 
-    constexpr double good = 1.03; // imbalance below which only the halo counts
     even_out(g, best, parts, good);
     CutReport report = describe(g, best, parts);
     MetisGraph metis(g, parts);
@@ -470,6 +472,13 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
     ensure(parts >= 1, "a cut has at least one part");
     ensure(!previous || int(previous->size()) == g.size(), "the previous cut has another number of blocks");
     if (g.size() == 0) return {};
+    if (previous && g.size() > large_graph && method == Method::Metis &&
+        std::ranges::all_of(*previous, [&](int p) { return p >= 0 && p < parts; })) {
+        Cut part = *previous;
+        fill_empty_parts(g, part, std::min(parts, g.size()));
+        even_out(g, part, parts, good);
+        if (describe(g, part, parts).imbalance <= fair) return part;
+    }
     Cut part = best_cut(g, std::min(parts, g.size()), method);
     if (previous) keep_labels(g, part, parts, *previous);
     return part;
@@ -477,10 +486,15 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
 
 BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid& grid, int parts, Method method)
 {
-    ensure(listed.size() == lister.size(), "every block is listed by somebody");
+    ensure(lister.empty() || listed.size() == lister.size(), "every block is listed by somebody");
     BlockCut cut{block_graph(listed, grid), {}, {}};
     const BlockGraph& g = cut.graph;
 
+    if (lister.empty()) {
+        cut.owner = partition(g, parts, method);
+        cut.report = describe(g, cut.owner, parts);
+        return cut;
+    }
     // A block was where most of its work was listed.
     BlockIndex index;
     index.reserve(g.block.size());

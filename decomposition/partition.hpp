@@ -78,6 +78,9 @@ struct BlockGraph {
 /// on a work or particle count that is negative or not finite, and on a block outside its period.
 BlockGraph block_graph(std::span<const BlockWork>, const BlockGrid& = {});
 
+/// From so many blocks on a cut by METIS takes too long to be repeated: a known cut is evened out instead.
+inline constexpr int large_graph = 200000;
+
 enum class Method { Metis, Hilbert };
 const char* name(Method);
 
@@ -109,7 +112,7 @@ struct BlockCut {
     CutReport report;       // its seconds are left to the caller
 };
 /// Cuts blocks listed by several ranks: equal blocks add up, and a part keeps the label of the rank that listed most of
-/// its work. Throws as block_graph().
+/// its work. Without listers labels are free: parts of neighbouring numbers lie near each other. Throws as block_graph().
 BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid&, int parts, Method = Method::Metis);
 
 /// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004)

@@ -292,8 +292,8 @@ std::string StartSoil::likeness(const Block& b) const
                             const int side = int(std::floor(in_blocks)) + 1;
                             if (side >= 0 && side < 3) ++n[side];
                         }
-                        fmt::format_to(std::back_inserter(text), " {} {} {} {}", std::llround((g.at(a, 0) + move - low) / (close * dx)), n[0],
-                                       n[1], n[2]);
+                        fmt::format_to(std::back_inserter(text), " {} {} {} {}", std::llround((g.at(a, 0) + move - low) / (close * dx)),
+                                       n[0], n[1], n[2]);
                     }
                 }
             }

@@ -24,6 +24,15 @@ Scene SceneArguments::read(const Comm& comm) const
     return io::parse_scene(text, file, sets, force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce);
 }
 
+void require_same_scene(const io::Checkpoint& from, const std::string& scene_hash)
+{
+    if (from.scene_hash == scene_hash) return;
+    throw BadInput(
+        fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
+                    "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
+                    from.file.string(), from.scene_hash, scene_hash));
+}
+
 std::string version() { return KUZURE_VERSION; }
 
 std::string version_text()

@@ -1,6 +1,7 @@
 #pragma once
 // What the commands share: the team, the scene given on the command line, and how they are registered.
 #include "decomposition/comm.hpp"
+#include "io/checkpoint.hpp"
 #include "io/scene_file.hpp"
 #include <functional>
 #include <string>
@@ -24,6 +25,9 @@ struct SceneArguments {
     /// Collective: rank 0 reads the file, every rank parses. Throws BadInput on all ranks.
     Scene read(const Comm&) const;
 };
+
+/// Throws BadInput where a checkpoint belongs to another scene than the one of this hash.
+void require_same_scene(const io::Checkpoint&, const std::string& scene_hash);
 
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;

@@ -60,16 +60,8 @@ CutShare share_out(const BlockSoil& soil, int ranks, double reach, double row_by
     const WeighedBlocks weighed = weigh(soil);
     s.weigh_seconds = omp_get_wtime() - start;
 
-    // Run's ranks list every so many blocks of all, those without soil among them: who listed one decides labels only.
-    std::vector<int> lister;
-    {
-        const auto all = soil.blocks();
-        std::size_t next = 0;
-        for (std::size_t k = 0; k < all.size() && next < weighed.listed.size(); ++k)
-            if (all[k] == weighed.listed[next].block) lister.push_back(int(k % std::size_t(ranks))), ++next;
-    }
     const double cutting = omp_get_wtime();
-    const BlockCut cut = cut_blocks(weighed.listed, lister, soil.space().grid(reach, row_bytes), ranks, method);
+    const BlockCut cut = cut_blocks(weighed.listed, {}, soil.space().grid(reach, row_bytes), ranks, method);
     s.cut_seconds = omp_get_wtime() - cutting;
 
     const BlockGraph& g = cut.graph;

@@ -30,6 +30,9 @@ struct Wishes {
     bool stop = false, checkpoint = false;
 };
 
+/// Bytes of a ghost, sent once a step.
+std::size_t row_bytes(const PairModel&);
+
 /// Where a run stands, beside the particles: what a checkpoint keeps to go on bit for bit.
 struct Clock {
     double time = 0; // s
@@ -113,6 +116,10 @@ private:
     void widen_energy_unit();
     void fill();
     void cut_by_counts();
+    /// Blocks of this rank's particles and their costs; pairs are those of the last sort.
+    std::vector<BlockWork> block_work() const;
+    /// Seconds of this rank per unit of work since the last cut, against all ranks; 1 where they differ little. Collective.
+    double slowness(double work) const;
     void recut();
     void rebuild(bool sort_anew);
     /// What fails on one rank fails on all, with the words of the highest such rank.
@@ -122,7 +129,6 @@ private:
     void make_records();
     bool outgrown() const;
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
-    std::size_t row_bytes() const;
     /// Looks for limits that broke in the last step; throws NumbersFailed.
     void judge_step();
     /// The guard's look at energies and neighbourhoods, after a list rebuild. Throws NumbersFailed.
@@ -159,8 +165,9 @@ private:
     double reach_, skin_; // m
     Clock clock_;
     bool built_ = false;
-    double busy_before_ = 0;
-    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0;
+    double busy_before_ = 0, busy_since_cut_ = 0; // s
+    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0, my_halo_bytes_ = 0, my_messages_ = 0;
+    std::optional<RankStep> first_step_;
     Structure structure_;
     struct Good {
         Particles particles;
