@@ -9,15 +9,6 @@
 namespace kuzure {
 namespace {
 
-std::array<double, 3> axes(Vector v) { return {v.x, v.y, v.z}; }
-
-std::string lost_at(Vector x)
-{
-    return fmt::format("a soil particle is at ({}, {}, {}) m, outside of anything that can be cut into blocks: the run "
-                       "has blown up; try a smaller time step",
-                       x.x, x.y, x.z);
-}
-
 /// Particles below which threads cost more than they bring.
 constexpr Index parallel = 4096;
 
@@ -44,52 +35,8 @@ template <class T> std::vector<T> take(std::span<const std::byte>& from)
 
 } // namespace
 
-// ---- blocks
+// ---- owners
 // --------------------------------------------------------------------------------------------------------
-Domain::Domain(const Comm& comm, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low, Vector period_length)
-    : comm_(comm), origin_(origin), size_(block_size), period_low_(period_low), period_length_(period_length)
-{
-    for (int a = 0; a < 3; ++a) {
-        const double size = axes(size_)[a], length = axes(period_length_)[a];
-        ensure(size > 0 && std::isfinite(size), "the size of a block is not positive");
-        if (!periodic[a]) continue;
-        const double n = std::round(length / size);
-        if (!(n >= 1 && n < block_limit && std::abs(n * size - length) <= 1e-9 * length))
-            throw BadInput(fmt::format("the period along {} ({} m) is not a whole number of blocks of {} m: choose a "
-                                       "block size that divides it",
-                                       "xyz"[a], length, size));
-        period_[a] = std::int32_t(n);
-    }
-}
-
-bool Domain::raw_block(Vector x, Block& b) const
-{
-    const double k[3] = {std::floor((x.x - origin_.x) / size_.x), std::floor((x.y - origin_.y) / size_.y),
-                         std::floor((x.z - origin_.z) / size_.z)};
-    for (int a = 0; a < 3; ++a) {
-        if (!(k[a] >= -block_limit && k[a] < block_limit)) return false;
-        b[a] = std::int32_t(k[a]);
-    }
-    return true;
-}
-
-Block Domain::wrapped(Block b) const
-{
-    for (int a = 0; a < 3; ++a) {
-        if (!period_[a]) continue;
-        b[a] %= period_[a];
-        if (b[a] < 0) b[a] += period_[a];
-    }
-    return b;
-}
-
-Block Domain::block_of(Vector x) const
-{
-    Block b;
-    if (!raw_block(x, b)) throw NumbersFailed(lost_at(x));
-    return wrapped(b);
-}
-
 void Domain::stop_if_lost(bool mine, Vector x) const
 {
     const int rank = int(comm_.max(std::int64_t(mine ? comm_.rank() : -1)));
@@ -100,8 +47,9 @@ int Domain::owner_of(const Block& asked) const
 {
     ensure(is_cut_, "a domain is asked for owners before it is cut");
     if (block_.empty()) return 0;
-    const Block b = wrapped(asked);
-    if (const int k = index_[b]; k >= 0) return owner_[k];
+    const Block b = space_.wrapped(asked);
+    const auto& period = space_.period();
+    if (const int k = place_of(b); k >= 0) return owner_[k];
 
     // (largest difference, squared distance, lexicographic place): the least wins.
     using Rank = std::tuple<std::int64_t, std::int64_t, int>;
@@ -109,7 +57,7 @@ int Domain::owner_of(const Block& asked) const
         std::int64_t largest = 0, squared = 0;
         for (int a = 0; a < 3; ++a) {
             std::int64_t d = std::abs(std::int64_t(block_[k][a]) - b[a]);
-            if (period_[a]) d = std::min(d, period_[a] - d);
+            if (period[a]) d = std::min(d, period[a] - d);
             largest = std::max(largest, d);
             squared += d * d;
         }
@@ -122,10 +70,10 @@ int Domain::owner_of(const Block& asked) const
         for (int i = -s; i <= s; ++i)
             for (int j = -s; j <= s; ++j)
                 for (int l = -s; l <= s; l += std::abs(i) == s || std::abs(j) == s ? 1 : 2 * s) {
-                    const Block near = wrapped({b[0] + i, b[1] + j, b[2] + l});
+                    const Block near = space_.wrapped({b[0] + i, b[1] + j, b[2] + l});
                     bool inside = true;
                     for (const auto c : near) inside = inside && c >= -block_limit && c < block_limit;
-                    const int k = inside ? index_[near] : -1;
+                    const int k = inside ? place_of(near) : -1;
                     if (k >= 0) best = std::min(best, rank_of(k));
                 }
     if (best == none)
@@ -135,7 +83,7 @@ int Domain::owner_of(const Block& asked) const
 
 // ---- cutting
 // -------------------------------------------------------------------------------------------------------
-CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo)
+CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo, Labels labels)
 {
     const double start = now();
     const auto lists = comm_.gather(std::as_bytes(mine));
@@ -151,25 +99,8 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
                 if (n) std::memcpy(&all[at], lists[r].data(), n * sizeof(BlockWork));
                 lister.resize(at + n, r);
             }
-            BlockGrid grid;
-            grid.period = period_;
-            grid.row_bytes = halo.row_bytes;
-            if (halo.reach > 0)
-                for (int a = 0; a < 3; ++a) grid.reach[a] = halo.reach / axes(size_)[a];
-            const BlockGraph g = block_graph(all, grid);
-
-            // A block was where most of its work was listed.
-            BlockIndex index;
-            index.reserve(g.block.size());
-            for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
-            std::vector<std::map<int, double>> shares(g.block.size());
-            for (std::size_t k = 0; k < all.size(); ++k) shares[index[all[k].block]][lister[k]] += all[k].work;
-            std::vector<int> previous(g.block.size(), -1);
-            for (int b = 0; b < g.size(); ++b)
-                previous[b] = std::ranges::max_element(shares[b], {}, [](const auto& s) { return s.second; })->first;
-
-            const std::vector<int> owner = partition(g, comm_.size(), method, &previous);
-            const CutReport r = describe(g, owner, comm_.size());
+            if (labels == Labels::Free) lister.clear();
+            const auto [g, owner, r] = cut_blocks(all, lister, space_.grid(halo.reach, halo.row_bytes), comm_.size(), method);
             put(result, std::span<const char>());
             put(result, std::span<const Block>(g.block));
             put(result, std::span<const int>(owner));
@@ -179,6 +110,7 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
             put(result, std::span<const double>(r.particles));
             put(result, std::span<const double>(r.ghosts));
             put(result, std::span<const int>(r.peers));
+            put(result, std::span<const int>(r.pieces));
         } catch (const std::exception& e) {
             failure = e.what();
         }
@@ -204,10 +136,8 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
     r.particles = take<double>(from);
     r.ghosts = take<double>(from);
     r.peers = take<int>(from);
+    r.pieces = take<int>(from);
 
-    index_ = {};
-    index_.reserve(block_.size());
-    for (int b = 0; b < int(block_.size()); ++b) index_.set(block_[b], b);
     is_cut_ = true;
     r.seconds = comm_.max(now() - start);
     return r;
@@ -229,7 +159,7 @@ Domain::Moved Domain::migrate(Particles& p) const
 #pragma omp for schedule(static)
         for (Index i = 0; i < n; ++i) {
             Block b;
-            if (!raw_block(x[i], b)) {
+            if (!space_.raw_block(x[i], b)) {
                 lost = std::max(lost, i);
                 continue;
             }
@@ -266,49 +196,25 @@ Domain::Moved Domain::migrate(Particles& p) const
 
 // ---- who needs to see whom
 // -----------------------------------------------------------------------------------------
-namespace {
-
-struct Bounds {
-    double low[3], high[3];
-    static Bounds none()
-    {
-        const double inf = std::numeric_limits<double>::infinity();
-        return {{inf, inf, inf}, {-inf, -inf, -inf}};
-    }
-    bool empty() const { return low[0] > high[0]; }
-    void add(const double* l, const double* h)
-    {
-        for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], l[a]), high[a] = std::max(high[a], h[a]);
-    }
-};
-
-/// Squared distance of box a, moved by d, from box b.
-double squared_distance(const Bounds& a, const double* d, const Bounds& b)
-{
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-        const double gap = std::max({0.0, b.low[k] - (a.high[k] + d[k]), (a.low[k] + d[k]) - b.high[k]});
-        sum += gap * gap;
-    }
-    return sum;
-}
-
-} // namespace
-
 HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
 {
     HaloPlan plan;
+    const auto &low = space_.period_low(), &length = space_.period_length();
+    const auto& period = space_.period();
     std::vector<int> shifts;
     for (int s = 0; s < 27; ++s) {
         const int d[3] = {s % 3 - 1, s / 3 % 3 - 1, s / 9 - 1};
-        plan.shift[s] = {d[0] * period_length_.x, d[1] * period_length_.y, d[2] * period_length_.z};
+        plan.shift[s] = {d[0] * length[0], d[1] * length[1], d[2] * length[2]};
         bool possible = true;
-        for (int a = 0; a < 3; ++a) possible = possible && (d[a] == 0 || period_[a] > 0);
+        for (int a = 0; a < 3; ++a) possible = possible && (d[a] == 0 || period[a] > 0);
         if (!possible) plan.shift[s] = {};
         else shifts.push_back(s);
     }
-    for (int a = 0; a < 3; ++a) ensure(period_[a] == 0 || reach <= axes(period_length_)[a], "the halo reaches further than a period");
-    const auto shift = [&](int s) { return axes(plan.shift[s]); };
+    for (int a = 0; a < 3; ++a) ensure(period[a] == 0 || reach <= length[a], "the halo reaches further than a period");
+    const auto shift = [&](int s) {
+        const Vector d = plan.shift[s];
+        return std::array<double, 3>{d.x, d.y, d.z};
+    };
 
     // The particles by block, and the box that each block's particles fill. Blocks are not wrapped here: one
     // across a period's seam would fill a box as long as the period.
@@ -316,11 +222,10 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     double largest = 0;
     bool outside = false;
     Index lost = -1;
-    const auto low = axes(period_low_), length = axes(period_length_);
 #pragma omp parallel for schedule(static) reduction(max : largest, lost) reduction(|| : outside) if (n > parallel)
     for (Index i = 0; i < n; ++i) {
         Block b;
-        if (!raw_block(x[i], b)) {
+        if (!space_.raw_block(x[i], b)) {
             lost = std::max(lost, i);
             continue;
         }
@@ -329,7 +234,7 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             const double c = x.column[a][i];
             largest = std::max(largest, std::abs(c));
             const double slack = 1e-9 * length[a];
-            if (period_[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
+            if (period[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
         }
     }
     stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
@@ -357,17 +262,12 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     const int n_boxes = int(box.size());
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g)
-        for (Index k = first[g]; k < first[g + 1]; ++k) {
-            const Vector v = x[member[k]];
-            const double at[3] = {v.x, v.y, v.z};
-            box[g].add(at, at);
-        }
+        for (Index k = first[g]; k < first[g + 1]; ++k) box[g].add(x[member[k]]);
     Bounds whole = Bounds::none();
     for (const auto& b : box) whole.add(b.low, b.high);
 
-    // Rounding must not lose a pair that the solver, adding the shift on the other side, finds just inside.
     const double extent = std::max({largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])});
-    const double safe = reach * (1 + 1e-9) + 1e-14 * comm_.max(extent), reach2 = safe * safe;
+    const double safe = halo_reach(reach, comm_.max(extent)), reach2 = safe * safe;
 
     // First whole ranks, then their blocks: each rank tells those near it which of its boxes are near them.
     const auto wholes = comm_.allgather(whole);
@@ -406,10 +306,8 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
                 if (near.empty()) continue;
                 for (Index k = first[g]; k < first[g + 1]; ++k) {
                     const Index i = member[k];
-                    const Vector v = x[i];
-                    const Bounds at{{v.x, v.y, v.z}, {v.x, v.y, v.z}};
                     for (const Bounds*& b : near) {
-                        if (squared_distance(at, d.data(), *b) > reach2) continue;
+                        if (squared_distance(x[i], d.data(), *b) > reach2) continue;
                         found[g].push_back({peer, {i, s}});
                         std::swap(b, near.front()); // the next particle is probably near the same box
                         break;

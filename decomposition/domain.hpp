@@ -1,9 +1,9 @@
 #pragma once
 // Who owns what: space in blocks, blocks to ranks. Everything here happens at rebuild steps that all ranks
 // agree on; a cut decides who computes a particle, never a bit of the result.
+#include "decomposition/block_space.hpp"
 #include "decomposition/comm.hpp"
 #include "decomposition/halo.hpp"
-#include "decomposition/partition.hpp"
 #include "solver/core/particles.hpp"
 #include <string>
 
@@ -15,20 +15,26 @@ struct HaloCost {
     double row_bytes = 128;
 };
 
+/// Whether a cut leaves a part's work with the rank that holds it, or nobody holds any yet.
+enum class Labels { Kept, Free };
+
 class Domain {
 public:
     /// Blocks of this size from this origin (m); on a periodic axis the period must hold a whole number of
     /// blocks, else BadInput.
-    Domain(const Comm&, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low, Vector period_length);
+    Domain(const Comm& comm, Vector origin, Vector block_size, std::array<bool, 3> periodic, Vector period_low, Vector period_length)
+        : Domain(comm, BlockSpace(origin, block_size, periodic, period_low, period_length))
+    {
+    }
+    Domain(const Comm& comm, BlockSpace space) : comm_(comm), space_(std::move(space)) {}
 
-    /// floor((x - origin)/size) by axis, wrapped to 0 .. n-1 on periodic axes. Throws NumbersFailed for a
-    /// position that is not finite or more than 2^20 blocks away.
-    Block block_of(Vector x) const;
+    /// BlockSpace::block_of().
+    Block block_of(Vector x) const { return space_.block_of(x); }
 
     /// Cuts anew; collective. `mine` lists what this rank's blocks cost; equal blocks of several ranks add
-    /// up. Labels stay with the rank that listed most of a part's work. The report is the same on every rank,
-    /// its seconds the longest of all ranks.
-    CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {});
+    /// up. Labels stay with the rank that listed most of a part's work, or are free (cut_blocks()). The report is the same
+    /// on every rank, its seconds the longest of all ranks.
+    CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {}, Labels = Labels::Kept);
 
     /// The same on every rank, for any block: where no soil was at the last cut, the owner of the nearest
     /// block that had some (largest difference of an axis, then distance, then lexicographic order). Throws
@@ -55,21 +61,24 @@ public:
     std::span<const Block> blocks() const { return block_; }
     std::span<const int> owners() const { return owner_; }
     /// Blocks per period by axis; 0 where open.
-    const std::array<std::int32_t, 3>& period() const { return period_; }
+    const std::array<std::int32_t, 3>& period() const { return space_.period(); }
+    const BlockSpace& space() const { return space_; }
 
 private:
-    /// Without the wrap; nothing where block_of() would throw.
-    bool raw_block(Vector x, Block& b) const;
-    Block wrapped(Block) const;
+    /// Place of a wrapped block in block_, or -1. A search, not a table: of all that a rank keeps, only this list grows with
+    /// the whole scene.
+    int place_of(const Block& b) const
+    {
+        const auto at = std::ranges::lower_bound(block_, b);
+        return at != block_.end() && *at == b ? int(at - block_.begin()) : -1;
+    }
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 
     const Comm& comm_;
-    Vector origin_, size_, period_low_, period_length_;
-    std::array<std::int32_t, 3> period_{};
+    BlockSpace space_;
     std::vector<Block> block_;
     std::vector<int> owner_;
-    BlockIndex index_;
     bool is_cut_ = false;
 };
 

@@ -2,6 +2,7 @@
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <metis.h>
 #include <numeric>
 #include <utility>
@@ -79,6 +80,23 @@ std::array<Layer, 3> layers(double reach)
     return {{{1 - r, true, false}, {2 * r - 1, true, true}, {1 - r, false, true}}};
 }
 
+/// Sets of blocks of one part that hang together by faces, edges or corners, each by number, the sets by their first.
+std::vector<std::vector<int>> pieces_of(const BlockGraph& g, std::span<const int> part)
+{
+    std::vector<std::vector<int>> pieces;
+    std::vector<char> seen(g.size(), 0);
+    for (int b = 0; b < g.size(); ++b) {
+        if (std::exchange(seen[b], 1)) continue;
+        std::vector<int> piece{b};
+        for (std::size_t k = 0; k < piece.size(); ++k)
+            for (const auto& l : g.links(piece[k]))
+                if (part[l.block] == part[b] && !std::exchange(seen[l.block], 1)) piece.push_back(l.block);
+        std::ranges::sort(piece);
+        pieces.push_back(std::move(piece));
+    }
+    return pieces;
+}
+
 } // namespace
 
 CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
@@ -95,6 +113,8 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
         r.work[part[b]] += g.work[b];
         r.particles[part[b]] += g.particles[b];
     }
+    r.pieces.assign(parts, 0);
+    for (const auto& piece : pieces_of(g, part)) ++r.pieces[part[piece.front()]];
     const double total = std::accumulate(r.work.begin(), r.work.end(), 0.0);
     if (total > 0) r.imbalance = *std::ranges::max_element(r.work) * parts / total;
 
@@ -340,7 +360,7 @@ void even_out(const BlockGraph& g, Cut& part, int parts, double target)
     std::vector<std::vector<int>> members(parts);
     std::vector<int> order(parts);
     std::vector<double> ties(parts, 0.0);
-    for (int pass = 0; pass < 40; ++pass) {
+    for (int pass = 0; pass < 100; ++pass) {
         if (*std::ranges::max_element(loads.work) <= target * mean) return;
         for (auto& m : members) m.clear();
         for (int b = 0; b < g.size(); ++b) members[part[b]].push_back(b);
@@ -371,16 +391,14 @@ void even_out(const BlockGraph& g, Cut& part, int parts, double target)
     }
 }
 
-/// Renames the parts so that most work stays where it was: greedy matching on the shared work.
-void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<int>& previous)
+/// Work that one thing has in common with another.
+struct Share {
+    int now, before;
+    double work;
+};
+/// Adds up what belongs to the same two, and sorts by them.
+void merge(std::vector<Share>& shares)
 {
-    struct Share {
-        int now, before;
-        double work;
-    };
-    std::vector<Share> shares;
-    for (int b = 0; b < g.size(); ++b)
-        if (previous[b] >= 0 && previous[b] < parts) shares.push_back({part[b], previous[b], g.work[b]});
     std::ranges::stable_sort(shares, {}, [](const Share& s) { return std::pair(s.now, s.before); });
     std::size_t kept = 0;
     for (const Share& s : shares) {
@@ -388,6 +406,15 @@ void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<in
         else shares[kept++] = s;
     }
     shares.resize(kept);
+}
+
+/// Renames the parts so that most work stays where it was: greedy matching on the shared work.
+void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<int>& previous)
+{
+    std::vector<Share> shares;
+    for (int b = 0; b < g.size(); ++b)
+        if (previous[b] >= 0 && previous[b] < parts) shares.push_back({part[b], previous[b], g.work[b]});
+    merge(shares);
     std::ranges::stable_sort(shares, std::greater{}, &Share::work);
     std::vector<int> label(parts, -1);
     std::vector<char> taken(parts, 0);
@@ -402,6 +429,9 @@ void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<in
     for (int& p : part) p = label[p];
 }
 
+constexpr double good = 1.03; // imbalance below which only the halo counts
+constexpr double fair = 1.05; // imbalance that an evened out cut may keep
+
 Cut best_cut(const BlockGraph& g, int parts, Method method)
 {
     if (parts == 1) return Cut(g.size(), 0);
@@ -413,7 +443,6 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
     fill_empty_parts(g, best, parts);
     if (method == Method::Hilbert) return best;
 
-    constexpr double good = 1.03; // imbalance below which only the halo counts
     even_out(g, best, parts, good);
     CutReport report = describe(g, best, parts);
     MetisGraph metis(g, parts);
@@ -443,9 +472,44 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
     ensure(parts >= 1, "a cut has at least one part");
     ensure(!previous || int(previous->size()) == g.size(), "the previous cut has another number of blocks");
     if (g.size() == 0) return {};
+    if (previous && g.size() > large_graph && method == Method::Metis &&
+        std::ranges::all_of(*previous, [&](int p) { return p >= 0 && p < parts; })) {
+        Cut part = *previous;
+        fill_empty_parts(g, part, std::min(parts, g.size()));
+        even_out(g, part, parts, good);
+        if (describe(g, part, parts).imbalance <= fair) return part;
+    }
     Cut part = best_cut(g, std::min(parts, g.size()), method);
     if (previous) keep_labels(g, part, parts, *previous);
     return part;
+}
+
+BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid& grid, int parts, Method method)
+{
+    ensure(lister.empty() || listed.size() == lister.size(), "every block is listed by somebody");
+    BlockCut cut{block_graph(listed, grid), {}, {}};
+    const BlockGraph& g = cut.graph;
+
+    if (lister.empty()) {
+        cut.owner = partition(g, parts, method);
+        cut.report = describe(g, cut.owner, parts);
+        return cut;
+    }
+    // A block was where most of its work was listed.
+    BlockIndex index;
+    index.reserve(g.block.size());
+    for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
+    std::vector<Share> shares;
+    for (std::size_t k = 0; k < listed.size(); ++k) shares.push_back({index[listed[k].block], lister[k], listed[k].work});
+    merge(shares);
+    std::vector<int> previous(g.block.size(), -1);
+    std::vector<double> most(g.block.size(), -1);
+    for (const Share& s : shares)
+        if (s.work > most[s.now]) most[s.now] = s.work, previous[s.now] = s.before;
+
+    cut.owner = partition(g, parts, method, &previous);
+    cut.report = describe(g, cut.owner, parts);
+    return cut;
 }
 
 } // namespace kuzure

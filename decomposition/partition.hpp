@@ -78,6 +78,9 @@ struct BlockGraph {
 /// on a work or particle count that is negative or not finite, and on a block outside its period.
 BlockGraph block_graph(std::span<const BlockWork>, const BlockGrid& = {});
 
+/// From so many blocks on a cut by METIS takes too long to be repeated: a known cut is evened out instead.
+inline constexpr int large_graph = 200000;
+
 enum class Method { Metis, Hilbert };
 const char* name(Method);
 
@@ -91,6 +94,7 @@ struct CutReport {
     std::vector<double> particles; // owned by each part
     std::vector<double> ghosts;    // of each part, its own periodic images included
     std::vector<int> peers;        // parts that each part sends to
+    std::vector<int> pieces;       // of each part: sets of its blocks that do not touch each other
 };
 /// Looks at a given cut: part[b] in 0 .. parts-1.
 CutReport describe(const BlockGraph&, std::span<const int> part, int parts);
@@ -100,6 +104,16 @@ CutReport describe(const BlockGraph&, std::span<const int> part, int parts);
 /// where it was. Metis: the best of several cuts by METIS 5, evened out; where none is better, the Hilbert
 /// curve's.
 std::vector<int> partition(const BlockGraph&, int parts, Method = Method::Metis, const std::vector<int>* previous = nullptr);
+
+/// A cut with what it was made from.
+struct BlockCut {
+    BlockGraph graph;
+    std::vector<int> owner; // of each block of the graph
+    CutReport report;       // its seconds are left to the caller
+};
+/// Cuts blocks listed by several ranks: equal blocks add up, and a part keeps the label of the rank that listed most of
+/// its work. Without listers labels are free: parts of neighbouring numbers lie near each other. Throws as block_graph().
+BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid&, int parts, Method = Method::Metis);
 
 /// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004)
 /// 381.

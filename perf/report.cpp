@@ -59,7 +59,16 @@ PhaseReport phase_report(const Timers& timers, const WorkDone& mine, int threads
     PhaseReport report;
     report.ranks = team.size();
     report.threads = threads;
-    report.work = {team.max(mine.steps), team.sum(mine.particle_steps), team.sum(mine.pairs)};
+    report.work = {.steps = team.max(mine.steps),
+                   .particle_steps = team.sum(mine.particle_steps),
+                   .pairs = team.sum(mine.pairs),
+                   .halo_bytes = team.sum(mine.halo_bytes),
+                   .messages = team.sum(mine.messages)};
+    // Every rank's numbers at its own place of a sum: integers add up the same way everywhere.
+    report.first_step.resize(std::size_t(team.size()));
+    report.first_step[std::size_t(team.rank())] = mine.first_step;
+    static_assert(sizeof(RankStep) == 5 * sizeof(std::int64_t));
+    team.sum(std::span(&report.first_step.front().soil, 5 * report.first_step.size()));
     const auto row = [&](int k) {
         return PhaseRow{.min = low[k],
                         .mean = sums[k] / team.size(),
@@ -86,6 +95,8 @@ std::string PhaseReport::json() const
                              {"steps", work.steps},
                              {"particle_steps", work.particle_steps},
                              {"pairs", work.pairs},
+                             {"halo_bytes", work.halo_bytes},
+                             {"messages", work.messages},
                              {"seconds", total.max},
                              {"gflop_per_second", pair_loop.gflops()},
                              {"flop_per_byte", pair_loop.intensity()},
@@ -94,6 +105,9 @@ std::string PhaseReport::json() const
                              {"phases", nlohmann::ordered_json::object()}};
     for (int p = 0; p < n_phases; ++p)
         if (rows[p].calls > 0) j["phases"][std::string(name(Phase(p)))] = as_json(rows[p]);
+    for (const RankStep& r : first_step)
+        j["first_step"].push_back(
+            {{"soil", r.soil}, {"pairs", r.pairs}, {"ghosts", r.ghosts}, {"halo_bytes", r.halo_bytes}, {"messages", r.messages}});
     if (machine) j["machine"] = nlohmann::ordered_json::parse(to_json(*machine));
     return j.dump(2) + '\n';
 }
@@ -124,6 +138,9 @@ std::string PhaseReport::text() const
     line("");
     line("pairs               {} directed, {:.1f} per soil particle and step", grouped(work.pairs),
          each(double(work.pairs), work.particle_steps));
+    if (work.messages > 0)
+        line("halo                {:.1f} kB in {:.1f} messages a rank and step", 1e-3 * each(double(work.halo_bytes) / ranks, work.steps),
+             each(double(work.messages) / ranks, work.steps));
     line("time                {:.3f} ms a step, {:.1f} ns a soil particle and step", 1e3 * each(total.max, work.steps),
          1e9 * each(total.max, work.particle_steps));
     if (pair_loop.max > 0) {

@@ -7,14 +7,22 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace kuzure {
+
+/// What one rank had to do in one step. Bytes and messages are those it sends.
+struct RankStep {
+    std::int64_t soil = 0, pairs = 0, ghosts = 0, halo_bytes = 0, messages = 0;
+};
 
 /// What one rank has done in the time that its timers hold. Pairs are directed, soil i <- any j within 2 h.
 struct WorkDone {
     std::int64_t steps = 0;          // the same on every rank
     std::int64_t particle_steps = 0; // soil particles owned, summed over the steps
     std::int64_t pairs = 0;
+    std::int64_t halo_bytes = 0, messages = 0; // sent to other ranks, once a step
+    RankStep first_step;                       // of these timers; of one rank, so without meaning in a sum
 };
 
 /// One phase over all ranks.
@@ -36,7 +44,8 @@ struct PhaseReport {
     PhaseRow total;     // time in any phase
     PhaseRow pair_loop; // interior and rim together
     std::array<PhaseRow, n_phases> rows;
-    std::optional<Machine> machine; // set it, and both texts name the roofs
+    std::vector<RankStep> first_step; // by rank
+    std::optional<Machine> machine;   // set it, and both texts name the roofs
 
     /// The text of timers.json.
     std::string json() const;

@@ -30,6 +30,15 @@ io::Path SceneArguments::results(const Scene& scene, const std::string& asked) c
     return io::Path("results") / io::Path(file).stem();
 }
 
+void require_same_scene(const io::Checkpoint& from, const std::string& scene_hash)
+{
+    if (from.scene_hash == scene_hash) return;
+    throw BadInput(
+        fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
+                    "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
+                    from.file.string(), from.scene_hash, scene_hash));
+}
+
 std::string version() { return KUZURE_VERSION; }
 
 std::string version_text()

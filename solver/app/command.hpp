@@ -1,6 +1,7 @@
 #pragma once
 // What the commands share: the team, the scene given on the command line, and how they are registered.
 #include "decomposition/comm.hpp"
+#include "io/checkpoint.hpp"
 #include "io/file.hpp"
 #include "io/scene_file.hpp"
 #include <functional>
@@ -28,11 +29,15 @@ struct SceneArguments {
     io::Path results(const Scene&, const std::string& asked) const;
 };
 
+/// Throws BadInput where a checkpoint belongs to another scene than the one of this hash.
+void require_same_scene(const io::Checkpoint&, const std::string& scene_hash);
+
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
 void add_run(CLI::App&, Action& chosen);
 void add_check(CLI::App&, Action& chosen);
 void add_reference(CLI::App&, Action& chosen);
+void add_scale(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
 

@@ -19,6 +19,7 @@ int main(int argc, char** argv)
     add_report(app, chosen);
     add_job(app, chosen);
     add_reference(app, chosen);
+    add_scale(app, chosen);
 #if defined(KUZURE_TRAP_FPE)
     feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
 #endif

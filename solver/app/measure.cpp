@@ -1,6 +1,7 @@
 #include "solver/app/measure.hpp"
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <unordered_map>
 
 namespace kuzure {
@@ -13,7 +14,7 @@ struct Column {
 };
 } // namespace
 
-Heap measure_heap(const Team& team, const Particles& p, const Scene& s, const scene::Filling& filling)
+Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
 {
     const double dx = s.space.spacing;
     const auto& start = filling.soil_bounds();
@@ -33,17 +34,22 @@ Heap measure_heap(const Team& team, const Particles& p, const Scene& s, const sc
     std::vector<Column> columns;
     columns.reserve(mine.size());
     for (const auto& [key, c] : mine) columns.push_back(c);
-    if (team.size() > 1) {
-        // Columns that several ranks share are put together on the root.
-        const auto parts = team.gather(std::as_bytes(std::span(columns)));
+    if (comm.size() > 1) {
+        // Columns that several ranks share are put together by a rank that their place decides, squares of them by one, so
+        // that nobody ever holds them all.
+        std::map<int, std::vector<Column>> to;
+        for (const Column& c : columns) {
+            const std::uint64_t square = (std::uint64_t(std::uint32_t(c.x >> 5)) << 32 | std::uint32_t(c.y >> 5)) * 0x9E3779B97F4A7C15u;
+            to[int((square >> 32) % std::uint64_t(comm.size()))].push_back(c);
+        }
+        std::vector<Parcel<Column>> parcels;
+        for (auto& [rank, which] : to) parcels.push_back({rank, std::move(which)});
         std::unordered_map<std::int64_t, Column> all;
-        for (const auto& part : parts)
-            for (std::size_t k = 0; k + sizeof(Column) <= part.size(); k += sizeof(Column)) {
-                Column c;
-                std::memcpy(&c, part.data() + k, sizeof c);
-                auto& to = all.try_emplace(std::int64_t(c.x) << 32 | std::uint32_t(c.y), Column{c.x, c.y, 0, c.top}).first->second;
-                to.count += c.count;
-                to.top = std::max(to.top, c.top);
+        for (const auto& part : comm.exchange(parcels))
+            for (const Column& c : part.items) {
+                auto& sum = all.try_emplace(std::int64_t(c.x) << 32 | std::uint32_t(c.y), Column{c.x, c.y, 0, c.top}).first->second;
+                sum.count += c.count;
+                sum.top = std::max(sum.top, c.top);
             }
         columns.clear();
         for (const auto& [key, c] : all) columns.push_back(c);
@@ -57,7 +63,7 @@ Heap measure_heap(const Team& team, const Particles& p, const Scene& s, const sc
         e[1] = std::max(e[1], -(corner.x + c.x * dx)), e[2] = std::max(e[2], corner.x + (c.x + 1) * dx);
         e[3] = std::max(e[3], -(corner.y + c.y * dx)), e[4] = std::max(e[4], corner.y + (c.y + 1) * dx);
     }
-    team.max(std::span<double>(e));
+    comm.max(std::span<double>(e));
     if (e[0] < -1e299) return {};
     if (s.dimensions == 2) e[3] = e[4] = 0;
     return {e[0], -e[1], e[2], -e[3], e[4]};

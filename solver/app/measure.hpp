@@ -1,7 +1,7 @@
 #pragma once
 // What a user measures on a heap: how high it stands and how far it reaches.
+#include "decomposition/comm.hpp"
 #include "solver/core/particles.hpp"
-#include "solver/core/team.hpp"
 #include "solver/scene/fill.hpp"
 
 namespace kuzure {
@@ -13,6 +13,6 @@ struct Heap {
     double min_x = 0, max_x = 0, min_y = 0, max_y = 0;
 };
 /// Collective; heights count from the lowest soil at the start.
-Heap measure_heap(const Team&, const Particles&, const Scene&, const scene::Filling&);
+Heap measure_heap(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 
 } // namespace kuzure

@@ -17,19 +17,109 @@ io::MachineProfile machine_named(const std::string& name_or_path)
     return m;
 }
 
+namespace {
+
+// What the model assumes beside a machine's constants; each is explained in docs/scaling.md.
+constexpr double rim_per_seen = 1.5;     // a cluster waits as a whole when one of its particles does
+constexpr double steps_per_rebuild = 17; // hirata_52: 579 rebuilds in 10,000 steps
+constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, places of ghosts
+constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
+constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
+constexpr double drift = 5e-5;           // growth of max/mean - 1 per step while soil slides
+constexpr double cut_seconds = 2.8e-6;   // METIS per block and halving of the parts, here
+constexpr double evening_seconds = 4e-6; // evening out and telling all ranks, per block, here
+constexpr double block_bytes = 48;       // of a block, its cost and its owner
+constexpr double scalar_ns_here = 59;    // particle_ns of the machine where the two above were measured
+
+} // namespace
+
+StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
+{
+    const auto& c = at.machine.cost;
+    const double cores = double(at.machine.node.cores) / at.ranks_per_node;
+    const double pair = 1e-9 * c.pair_ns(at.mixed) / cores, particle = 1e-9 * c.particle_ns / cores;
+    const double latency = c.latency * at.latency_times, bandwidth = c.bandwidth * at.bandwidth_times;
+    const double memory = c.memory_bandwidth / at.ranks_per_node; // a rank's share
+
+    StepSeconds s;
+    double slowest = 0, most_computed = 0, halo_of_slowest = 0, messages = 0, ghosts = 0, node_rows = 0;
+    for (const RankLoad& r : ranks) {
+        const double pairs = r.pairs * pair, computed = pairs + r.particles * particle;
+        s.pairs += pairs / double(ranks.size()), s.particles += r.particles * particle / double(ranks.size());
+        const double interior = r.particles > 0 ? pairs * (1 - std::min(1.0, rim_per_seen * r.rim / r.particles)) : 0;
+        // Packed and unpacked once each: read and written.
+        const double copies = 2 * (r.rows + r.ghosts) * at.row_bytes / memory;
+        const double near = r.messages - r.far_messages;
+        const double wire = (r.far_messages > 0 ? latency : 0) + r.node_rows * at.row_bytes / bandwidth +
+                            (near > 0 ? 2 * std::max(0.0, r.rows) * at.row_bytes / memory : 0);
+        // Half the latency of a message is the processor's own time, at both ends; within a node a fifth of it.
+        const double handling = latency * (r.far_messages + 0.2 * near);
+        const double halo = copies + handling + std::max(0.0, wire - interior);
+        s.network = std::max(s.network, wire);
+        messages = std::max(messages, r.messages), ghosts = std::max(ghosts, r.ghosts), node_rows = std::max(node_rows, r.node_rows);
+        most_computed = std::max(most_computed, computed);
+        if (computed + halo > slowest) slowest = computed + halo, halo_of_slowest = halo;
+    }
+    s.halo = halo_of_slowest;
+    s.imbalance = std::max(0.0, slowest - halo_of_slowest - s.pairs - s.particles);
+    if (at.ranks < 2) return s;
+    const double levels = std::ceil(std::log2(double(at.ranks)));
+    s.reduction = 2 * levels * latency;
+    s.rebuild = (rebuild_exchanges * (2 * messages + 2 * levels) * latency + (node_rows * ghost_bytes) / bandwidth +
+                 double(at.ranks_per_node) * at.ranks * box_bytes / bandwidth) /
+                steps_per_rebuild;
+    // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
+    // sqrt(2 C/(d t)) steps, and cut and idle time together cost 2 C of them.
+    const double per_block = at.blocks > large_graph ? evening_seconds : cut_seconds * levels;
+    const double cut = at.blocks * (per_block * c.particle_ns / scalar_ns_here + 2 * block_bytes / bandwidth);
+    if (cut > 0) {
+        s.recut_steps = std::sqrt(2 * cut / (drift * s.total()));
+        s.recut = 2 * cut / s.recut_steps;
+    }
+    return s;
+}
+
+std::vector<RankLoad> loads(const CutShare& cut, int ranks_per_node)
+{
+    std::vector<RankLoad> all(cut.rank.size());
+    std::vector<double> out(all.size() / std::size_t(ranks_per_node) + 1), in(out.size());
+    const auto node = [&](int rank) { return std::size_t(rank / ranks_per_node); };
+    for (const HaloMessage& m : cut.message) {
+        if (node(m.from) == node(m.to)) continue;
+        out[node(m.from)] += double(m.rows), in[node(m.to)] += double(m.rows);
+        ++all[m.from].far_messages;
+    }
+    for (std::size_t r = 0; r < all.size(); ++r) {
+        const RankShare& s = cut.rank[r];
+        const std::size_t n = node(int(r));
+        all[r] = {.pairs = s.work.pairs(),
+                  .particles = double(s.work.particles),
+                  .rim = double(s.seen),
+                  .rows = double(s.rows),
+                  .ghosts = double(s.ghosts),
+                  .messages = double(s.messages),
+                  .far_messages = all[r].far_messages,
+                  .node_rows = std::max(out[n], in[n])};
+    }
+    return all;
+}
+
 double predict_seconds(const Estimate& e, const io::MachineProfile& m, int nodes, int ranks_per_node)
 {
-    const double cores = double(nodes) * m.node.cores, ranks = double(nodes) * ranks_per_node;
-    const auto& c = m.cost;
-    const double work = 1e-9 * (e.pairs * c.pair_ns(e.mixed) + double(e.steps) * double(e.soil) * c.particle_ns) / cores;
-    if (ranks < 2) return work;
-    // A cube of soil a rank: its ghosts are a shell one support thick, one message to each of 26 neighbours, and one
-    // reduction up and down a binary tree. Nothing is overlapped.
-    const double edge = std::cbrt(std::max(1.0, double(e.soil) / ranks)), shell = e.support;
-    const double ghosts = std::pow(edge + 2 * shell, 3) - std::pow(edge, 3);
-    const double halo = ghosts * e.record * ranks_per_node / c.bandwidth + 26 * c.latency;
-    const double reduction = 2 * std::ceil(std::log2(ranks)) * c.latency;
-    return work + double(e.steps) * (halo + reduction);
+    // A cube of soil a rank and a cube of them a node: ghosts are a shell one support thick.
+    const double ranks = double(nodes) * ranks_per_node, n = double(e.soil) / ranks;
+    const auto shell = [&](double particles) { return std::pow(std::cbrt(particles) + 2 * e.support, 3) - particles; };
+    const double ghosts = std::min(ranks > 1 ? shell(n) : 0, double(e.soil) - n);
+    RankLoad r{.pairs = e.pairs / double(e.steps) / ranks,
+               .particles = n,
+               .rim = std::min(n, ghosts),
+               .rows = ghosts,
+               .ghosts = ghosts,
+               .messages = std::min(26.0, ranks - 1)};
+    r.far_messages = nodes > 1 ? r.messages : 0;
+    r.node_rows = nodes > 1 ? shell(n * ranks_per_node) : 0;
+    const StepPlace at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
+    return double(e.steps) * predict_step(std::span(&r, 1), at).total();
 }
 
 } // namespace kuzure

@@ -1,6 +1,7 @@
 #include "solver/app/simulation.hpp"
 #include "solver/app/guard.hpp"
 #include "solver/app/initial_stress.hpp"
+#include "solver/app/scaling.hpp"
 #include "solver/scene/check.hpp"
 #include <fmt/format.h>
 #include <limits>
@@ -10,40 +11,6 @@
 namespace kuzure {
 
 namespace {
-
-/// Edge of the blocks: about `per_rank` blocks of soil a rank, whole numbers of them on periodic axes.
-Vector block_size(const Scene& s, const scene::Filling& f, int ranks, int per_rank)
-{
-    const double dx = s.space.spacing;
-    const double particles = double(f.soil_count()) / (double(ranks) * per_rank);
-    double edge = std::max(3.0, s.dimensions == 3 ? std::cbrt(particles) : std::sqrt(particles)) * dx;
-    if (ranks == 1) edge = 1e3 * edge;
-    Vector size{edge, edge, edge};
-    const auto fit = [&](int axis, double lo, double hi, double& e) {
-        if (s.space.periodic[axis]) e = (hi - lo) / std::max(1.0, std::floor((hi - lo) / e));
-    };
-    if (s.space.low) {
-        fit(0, s.space.low->x, s.space.high->x, size.x);
-        fit(1, s.space.low->y, s.space.high->y, size.y);
-        fit(2, s.space.low->z, s.space.high->z, size.z);
-    }
-    return size;
-}
-Vector low_corner(const scene::Filling& f, const Scene& s)
-{
-    const double half = 0.5 * s.space.spacing;
-    const auto& b = f.soil_bounds();
-    return {b.low.x - half, s.dimensions == 3 ? b.low.y - half : -half, b.low.z - half};
-}
-Vector domain_origin(const scene::Filling& f, const Scene& s)
-{
-    Vector o = low_corner(f, s);
-    if (s.space.periodic[0]) o.x = s.space.low->x;
-    if (s.space.periodic[1]) o.y = s.space.low->y;
-    if (s.space.periodic[2]) o.z = s.space.low->z;
-    return o;
-}
-Vector period(const Scene& s) { return s.space.low && s.space.high ? *s.space.high - *s.space.low : Vector{1, 1, 1}; }
 
 template <class T> Record<T> far_away()
 {
@@ -59,9 +26,7 @@ template <class T> Record<T> far_away()
 Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
-              scene.space.low.value_or(Vector{}), period(scene)),
-      buffers_(Buffers<double>(scene.smoothing_length()))
+      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)), buffers_(Buffers<double>(scene.smoothing_length()))
 {
     timers_.timed(Phase::Setup, [&] {
         prepare();
@@ -86,9 +51,8 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
 Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
     : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, domain_origin(filling_, scene), block_size(scene, filling_, comm.size(), options.blocks_per_rank), scene.space.periodic,
-              scene.space.low.value_or(Vector{}), period(scene)),
-      particles_(std::move(particles)), buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
+      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)), particles_(std::move(particles)),
+      buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
 {
     timers_.timed(Phase::Setup, [&] {
         prepare();
@@ -97,10 +61,19 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
         for (Index i = 0; i < particles_.size(); ++i) count[domain_.block_of(particles_[field::position][i])] += 1;
         std::vector<BlockWork> work;
         for (const auto& [b, n] : count) work.push_back({b, n, n});
-        const auto report = domain_.cut(work, Method::Metis, {reach_, double(row_bytes())});
-        rebalance_ = Rebalance(report.imbalance, report.seconds);
+        // Rows of a checkpoint lie anywhere: nobody can count pairs before a first cut has brought neighbours together.
+        const double begin = omp_get_wtime();
+        const HaloCost halo{reach_, double(row_bytes(*model_))};
+        const bool again = clock_.step > 0 && comm_.size() > 1;
+        auto report = domain_.cut(work, again ? Method::Hilbert : Method::Metis, halo, Labels::Free);
         domain_.migrate(particles_);
         if (clock_.step > 0) rebuild(false);
+        if (again) {
+            report = domain_.cut(block_work(), Method::Metis, halo);
+            domain_.migrate(particles_);
+            rebuild(false);
+        }
+        rebalance_ = Rebalance(report.imbalance, omp_get_wtime() - begin);
     });
 }
 
@@ -111,7 +84,7 @@ void Simulation::prepare()
     const bool mixed = model_->precision() == scene::Precision::Mixed;
     if (mixed) buffers_ = Buffers<float>(scene_.smoothing_length());
     for (const auto& s : scene_.soils) soils_.push_back(Material::from(s));
-    reach_ = scene_.support() * (1 + scene_.accuracy.skin);
+    reach_ = list_reach(scene_);
     skin_ = scene_.support() * scene_.accuracy.skin;
     forces_.gravity = scene_.effects.gravity.value_or(Vector{});
     water_ = PoreWater::from(scene_.effects);
@@ -149,32 +122,16 @@ void Simulation::widen_energy_unit()
 
 void Simulation::cut_by_counts()
 {
-    // Each rank counts a share of the blocks; nobody makes a particle yet.
-    const auto& b = filling_.soil_bounds();
-    const Vector far = b.high;
-    const Block lo = domain_.block_of(b.low), hi = domain_.block_of(far);
-    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
-    std::vector<BlockWork> mine;
-    std::int64_t k = 0;
-    const auto edge = [&](double o, double s, std::int32_t i) { return o + s * i; };
-    for (auto x = lo[0]; x <= hi[0]; ++x)
-        for (auto y = lo[1]; y <= hi[1]; ++y)
-            for (auto z = lo[2]; z <= hi[2]; ++z, ++k) {
-                if (k % comm_.size() != comm_.rank()) continue;
-                const double inset = 1e-9 * scene_.space.spacing;
-                const scene::Box box{
-                    {edge(origin.x, size.x, x), edge(origin.y, size.y, y), edge(origin.z, size.z, z)},
-                    {edge(origin.x, size.x, x + 1) - inset, edge(origin.y, size.y, y + 1) - inset, edge(origin.z, size.z, z + 1) - inset}};
-                const double n = double(filling_.soil_count_in(box));
-                if (n > 0) mine.push_back({{x, y, z}, n, n});
-            }
-    const auto report = timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes())}); });
+    // Each rank counts a share of the blocks; nobody keeps a particle yet.
+    const auto mine = weigh(StartSoil(scene_, filling_, domain_.space()), std::size_t(comm_.rank()), std::size_t(comm_.size())).listed;
+    const auto report = timers_.timed(Phase::Partition, [&] {
+        return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes(*model_))}, Labels::Free);
+    });
     rebalance_ = Rebalance(report.imbalance, report.seconds);
 }
 
 void Simulation::fill()
 {
-    const Vector size = block_size(scene_, filling_, comm_.size(), options_.blocks_per_rank), origin = domain_origin(filling_, scene_);
     struct Start {
         std::int64_t id;
         Vector x;
@@ -184,10 +141,7 @@ void Simulation::fill()
     for (std::size_t k = 0; k < domain_.blocks().size(); ++k) {
         if (domain_.owners()[k] != comm_.rank()) continue;
         const Block b = domain_.blocks()[k];
-        const double margin = 1e-6 * scene_.space.spacing;
-        const scene::Box box{
-            {origin.x + size.x * b[0] - margin, origin.y + size.y * b[1] - margin, origin.z + size.z * b[2] - margin},
-            {origin.x + size.x * (b[0] + 1) + margin, origin.y + size.y * (b[1] + 1) + margin, origin.z + size.z * (b[2] + 1) + margin}};
+        const scene::Box box = box_of(domain_.space(), b, 1e-6 * scene_.space.spacing);
         filling_.for_each_soil_in(box, [&](std::int64_t id, Vector x, int body) {
             if (domain_.block_of(x) == b) start.push_back({id, x, body});
         });
@@ -295,7 +249,20 @@ Wishes Simulation::step(Wishes mine)
                     if (tensile) std::memcpy(to + sizeof r, &buffers.tension[owned], sizeof buffers.tension[owned]);
                 });
             });
-            result = timers_.timed(Phase::Interior, [&] { return model_->run(pass, lists_.interior()); });
+            result = timers_.timed(Phase::Interior, [&] {
+                // MPI moves long messages only when it is called: in a few portions of the work, none smaller than threads like.
+                auto left = lists_.interior();
+                const std::size_t portions = halo_->messages_per_refresh() > 0 ? 8 : 1;
+                const std::size_t portion = std::max<std::size_t>((left.size() + portions - 1) / portions, 512);
+                PassResult all;
+                while (left.size() > portion) {
+                    all.add(model_->run(pass, left.first(portion)));
+                    left = left.subspan(portion);
+                    halo_->progress();
+                }
+                all.add(model_->run(pass, left));
+                return all;
+            });
             count_work(Phase::Interior, result.pairs, lists_.interior().size());
             timers_.timed(Phase::HaloWait, [&] {
                 halo_->arrive([&](Index slot, const std::byte* row) {
@@ -312,6 +279,8 @@ Wishes Simulation::step(Wishes mine)
         buffers_);
 
     my_pairs_ += result.pairs;
+    my_halo_bytes_ += halo_->bytes_per_refresh(), my_messages_ += halo_->messages_per_refresh();
+    if (!first_step_) first_step_ = {particles_.size(), result.pairs, n_ghosts_, halo_->bytes_per_refresh(), halo_->messages_per_refresh()};
     my_particle_steps_ += particles_.size();
     clock_.dissipated.add(result.energy, clock_.energy_unit);
     clock_.step += 1;
@@ -480,11 +449,11 @@ bool Simulation::roll_back()
     return true;
 }
 
-std::size_t Simulation::row_bytes() const
+std::size_t row_bytes(const PairModel& model)
 {
-    const bool mixed = model_->precision() == scene::Precision::Mixed;
+    const bool mixed = model.precision() == scene::Precision::Mixed;
     const std::size_t record = mixed ? sizeof(Record<float>) : sizeof(Record<double>);
-    return record + (model_->tensile() ? record / 2 : 0);
+    return record + (model.tensile() ? record / 2 : 0);
 }
 
 void Simulation::wrap_periodic()
@@ -505,22 +474,51 @@ void Simulation::wrap_periodic()
     wrap(0, lo.x, hi.x), wrap(1, lo.y, hi.y), wrap(2, lo.z, hi.z);
 }
 
+std::vector<BlockWork> Simulation::block_work() const
+{
+    const auto x = particles_[field::position], sorted = particles_[field::sorted_position];
+    const Index n = particles_.size();
+    const double support = scene_.support(), support2 = support * support;
+    std::vector<StepWork> of(std::size_t(n), {1, -1, 0}); // every particle meets itself once in its list
+#pragma omp parallel for schedule(dynamic, 64)
+    for (Index c = 0; c < lists_.size(); ++c)
+        for (Index i = lists_.first(c); i < lists_.first(c) + lists_.count(c); ++i) {
+            const Vector here = sorted[i];
+            const auto close = [&](Vector there) { return dot(there - here, there - here) < support2; };
+            for (const Index j : lists_.soil(c))
+                of[i].soil_pairs += close(j < n ? sorted[j] : Vector{ghost_x_[j - n], ghost_y_[j - n], ghost_z_[j - n]});
+            for (auto runs = lists_.walls(c); !runs.empty(); runs = runs.subspan(2 + runs[1])) {
+                const WallPoints& w = walls_[runs[0]];
+                for (const Index k : runs.subspan(2, runs[1])) of[i].wall_pairs += close({w.x[k], w.y[k], w.z[k]});
+            }
+        }
+    std::map<Block, StepWork> blocks;
+    for (Index i = 0; i < n; ++i) blocks[domain_.block_of(x[i])].add(of[i]);
+    std::vector<BlockWork> work;
+    for (const auto& [b, w] : blocks) work.push_back({b, w.total(), double(w.particles)});
+    return work;
+}
+
+double Simulation::slowness(double work) const
+{
+    // Seconds per unit of work against those of all ranks: what pairs do not explain, such as a slow node. Less than a
+    // tenth is noise.
+    double all[] = {busy_since_cut_, work};
+    comm_.sum(std::span<double>(all));
+    if (!(busy_since_cut_ > 0.1) || !(work > 0) || !(all[0] > 0)) return 1;
+    const double ratio = busy_since_cut_ / work / (all[0] / all[1]);
+    return std::abs(ratio - 1) < 0.1 ? 1 : std::clamp(ratio, 0.5, 2.0);
+}
+
 void Simulation::recut()
 {
-    // What this rank's time went to, block by block: pairs in the lists, and a little for each particle.
-    std::map<Block, std::pair<double, double>> cost;
-    const auto x = particles_[field::position];
-    if (built_ && lists_.size() > 0)
-        for (Index c = 0; c < lists_.size(); ++c) {
-            auto& [work, n] = cost[domain_.block_of(x[lists_.first(c)])];
-            work += double(lists_.soil(c).size()) + 0.5 * double(lists_.walls(c).size()) + 8.0 * lists_.count(c);
-            n += lists_.count(c);
-        }
-    std::vector<BlockWork> mine;
-    for (const auto& [b, w] : cost) mine.push_back({b, w.first, w.second});
-    const double begin = omp_get_wtime();
-    timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes())}); });
-    rebalance_.cut(comm_, omp_get_wtime() - begin);
+    auto mine = block_work();
+    double total = 0;
+    for (const auto& b : mine) total += b.work;
+    const double slow = slowness(total);
+    for (auto& b : mine) b.work *= slow;
+    timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes(*model_))}); });
+    busy_since_cut_ = 0;
     ++structure_.cuts;
 }
 
@@ -545,10 +543,14 @@ void Simulation::rebuild(bool sort_anew)
             if (comm_.size() > 1) {
                 const double busy = timers_.seconds(Phase::Interior) + timers_.seconds(Phase::Rim);
                 const bool due = built_ && rebalance_.due(comm_, busy - busy_before_);
+                busy_since_cut_ += busy - busy_before_;
                 busy_before_ = busy;
                 structure_.imbalance = rebalance_.imbalance();
-                if (due || (options_.recut_every > 0 && built_ && structure_.rebuilds % options_.recut_every == 0)) recut();
+                const bool cut = due || (options_.recut_every > 0 && built_ && structure_.rebuilds % options_.recut_every == 0);
+                const double begin = omp_get_wtime();
+                if (cut) recut();
                 structure_.migrated += domain_.migrate(p).left;
+                if (cut) rebalance_.cut(comm_, omp_get_wtime() - begin);
             }
             const Index n = p.size();
             const auto x = p[field::position], to = p[field::sorted_position];
@@ -565,7 +567,7 @@ void Simulation::rebuild(bool sort_anew)
         });
     });
     timers_.timed(Phase::Ghosts, [&] {
-        halo_.emplace(comm_, domain_.plan_halo(std::as_const(p)[field::sorted_position], p.size(), reach_), row_bytes());
+        halo_.emplace(comm_, domain_.plan_halo(std::as_const(p)[field::sorted_position], p.size(), reach_), row_bytes(*model_));
         const auto arrived = halo_->ghosts(p);
         n_ghosts_ = Index(arrived.size());
         Array<double> x(n_ghosts_), y(n_ghosts_), z(n_ghosts_);
@@ -708,7 +710,10 @@ Clock Simulation::clock() const
     return c;
 }
 
-WorkDone Simulation::work_done() const { return {clock_.step, my_particle_steps_, my_pairs_}; }
+WorkDone Simulation::work_done() const
+{
+    return {clock_.step, my_particle_steps_, my_pairs_, my_halo_bytes_, my_messages_, first_step_.value_or(RankStep{})};
+}
 
 std::size_t Simulation::memory_bytes() const
 {

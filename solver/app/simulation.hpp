@@ -5,6 +5,7 @@
 #include "decomposition/rebalance.hpp"
 #include "perf/phases.hpp"
 #include "perf/report.hpp"
+#include "solver/app/blocks.hpp"
 #include "solver/app/energy.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/fill.hpp"
@@ -18,7 +19,7 @@ namespace kuzure {
 struct RunOptions {
     Arithmetic arithmetic = Arithmetic::Lanes;
     int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
-    int blocks_per_rank = 50;
+    int blocks_per_rank = default_blocks_per_rank;
     bool guard = true; // look for trouble at list rebuilds; perf/bench/guard.cpp measures what it costs
     /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say. Velocity, density and
     /// stress have half-step twins, which must be set alike.
@@ -29,6 +30,9 @@ struct RunOptions {
 struct Wishes {
     bool stop = false, checkpoint = false;
 };
+
+/// Bytes of a ghost, sent once a step.
+std::size_t row_bytes(const PairModel&);
 
 /// Where a run stands, beside the particles: what a checkpoint keeps to go on bit for bit.
 struct Clock {
@@ -113,6 +117,10 @@ private:
     void widen_energy_unit();
     void fill();
     void cut_by_counts();
+    /// Blocks of this rank's particles and their costs; pairs are those of the last sort.
+    std::vector<BlockWork> block_work() const;
+    /// Seconds of this rank per unit of work since the last cut, against all ranks; 1 where they differ little. Collective.
+    double slowness(double work) const;
     void recut();
     void rebuild(bool sort_anew);
     /// What fails on one rank fails on all, with the words of the highest such rank.
@@ -124,7 +132,6 @@ private:
     /// True where the pruned lists no longer hold everything in reach: then with a margin for the steps to come.
     bool prune_lists_anew(double dt);
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
-    std::size_t row_bytes() const;
     /// Looks for limits that broke in the last step; throws NumbersFailed.
     void judge_step();
     /// The guard's look at energies and neighbourhoods, after a list rebuild. Throws NumbersFailed.
@@ -163,8 +170,9 @@ private:
     double pruned_margin_ = 0, pruned_way_ = 0;
     Clock clock_;
     bool built_ = false;
-    double busy_before_ = 0;
-    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0;
+    double busy_before_ = 0, busy_since_cut_ = 0; // s
+    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0, my_halo_bytes_ = 0, my_messages_ = 0;
+    std::optional<RankStep> first_step_;
     Structure structure_;
     struct Good {
         Particles particles;

@@ -140,6 +140,7 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimension
         const auto side = [&](double low, double high) { return Axis{low, {0, std::int64_t(std::llround((high - low) / spacing)) - 1}}; };
         x_ = side(outer.low.x, outer.high.x), z_ = side(outer.low.z, outer.high.z);
         if (dimensions == 3) y_ = side(outer.low.y, outer.high.y);
+        is_box_ = true;
         row_start_ = {0, 1};
         intervals_ = {{0, x_.range.last, 0}};
         layer_id_ = {0, count(y_.range) * count(x_.range)};
@@ -271,6 +272,17 @@ std::int64_t Lattice::count_in(const Box& region) const
     return sum * (stride_z_ ? 1 : count(zs)) * (stride_y_ ? 1 : count(ys));
 }
 
+std::optional<GridPart> Lattice::grid_in(const Box& region) const
+{
+    if (!is_box_) return std::nullopt;
+    const Range xs = within(x_, region.low.x, region.high.x), zs = within(z_, region.low.z, region.high.z);
+    const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
+    const auto n = [](const Range& r) { return std::max<std::int64_t>(0, count(r)); };
+    // In 2-D points have y = 0 (y_of): half a spacing before the first coordinate of a lattice from there.
+    const double y = dimensions_ == 2 ? -0.5 * spacing_ : y_.origin;
+    return GridPart{{x_.origin, y, z_.origin}, {xs.first, ys.first, zs.first}, {n(xs), n(ys), n(zs)}, spacing_, false};
+}
+
 bool Lattice::reaches_into(const Shape& other) const
 {
     const Box region = scene::bounds(other);
@@ -371,6 +383,22 @@ std::int64_t Filling::wall_count_in(const Box& region) const
     std::int64_t sum = 0;
     for (std::size_t w = n_bodies_; w < lattices_.size(); ++w) sum += lattices_[w].count_in(region);
     return sum;
+}
+
+std::optional<std::vector<GridPart>> Filling::grids_in(const Box& region) const
+{
+    std::vector<GridPart> parts;
+    for (std::size_t k = 0; k < lattices_.size(); ++k) {
+        auto part = lattices_[k].grid_in(region);
+        if (!part) {
+            if (lattices_[k].count_in(region) > 0) return std::nullopt;
+            continue;
+        }
+        if (part->n[0] * part->n[1] * part->n[2] == 0) continue;
+        part->soil = k < n_bodies_;
+        parts.push_back(*part);
+    }
+    return parts;
 }
 
 std::size_t Filling::owner(std::int64_t id) const

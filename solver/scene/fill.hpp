@@ -5,8 +5,10 @@
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/scene/shape.hpp"
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,6 +17,15 @@ namespace kuzure::scene {
 
 /// Coordinate (m) of lattice point k along one axis: the only place where it is computed.
 inline double lattice_coordinate(double origin, std::int64_t k, double spacing) { return origin + (double(k) + 0.5) * spacing; }
+
+/// Points of a regular grid: lattice points first .. first + n - 1 along each axis.
+struct GridPart {
+    std::array<double, 3> origin;
+    std::array<std::int64_t, 3> first, n;
+    double spacing;
+    bool soil; // or wall
+    double at(int axis, std::int64_t k) const { return lattice_coordinate(origin[axis], first[axis] + k, spacing); }
+};
 
 /// The lattice points inside one shape. Order of local ids: z slowest, then y, then x. Boxes keep three
 /// numbers; other shapes keep, for every row along x, the intervals that lie inside.
@@ -34,6 +45,8 @@ public:
     /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does
     /// not count.
     template <class Visit> void for_each_in(const Box& region, Visit visit) const;
+    /// The points in a closed region where the shape is a box, else nothing.
+    std::optional<GridPart> grid_in(const Box& region) const;
     /// True if a lattice point lies strictly inside another shape.
     bool reaches_into(const Shape& other) const;
 
@@ -82,6 +95,7 @@ private:
 
     int dimensions_;
     double spacing_;
+    bool is_box_ = false;
     Axis x_, y_, z_;
     std::int64_t stride_z_ = 0, stride_y_ = 0;
     std::vector<std::size_t> row_start_; // first interval of every stored row, and the end
@@ -126,6 +140,9 @@ public:
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;
     std::int64_t wall_count_in(const Box& region) const;
+
+    /// What a closed region holds, as grids; nothing where a shape that is no box has points near it.
+    std::optional<std::vector<GridPart>> grids_in(const Box& region) const;
 
     /// Initial position (m) and body of a soil particle by its id.
     Vector soil_position(std::int64_t id) const;

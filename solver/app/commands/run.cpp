@@ -161,12 +161,8 @@ private:
             else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
-        if (from && from->scene_hash != hash_)
-            throw BadInput(
-                fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
-                            "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
-                            from->file.string(), from->scene_hash, hash_));
-        const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every, 50};
+        if (from) require_same_scene(*from, hash_);
+        const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
         fits_or_throw(where, from ? clock_from(from->header, from->file).time / scene_.time.end : 0);
         std::optional<double> restart_time;
         if (from) {
