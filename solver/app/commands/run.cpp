@@ -253,6 +253,8 @@ private:
         label.spacing = scene_.space.spacing;
         label.title = scene_.title;
         label.time = sim_->time();
+        const auto& start = sim_->filling().soil_bounds();
+        label.middle_y = 0.5 * (start.low.y + start.high.y);
         io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
     }
 
