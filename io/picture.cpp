@@ -350,7 +350,7 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         if (in_slice(x.column[1][i])) shown_soil.push_back(i), values.push_back(value(p, label.look.color, i));
     Range range = natural_range(team, values, label.look.color, d);
     if (const auto& fixed = label.look.range; fixed != std::array<double, 2>{})
-        range = {fixed[0], fixed[1], range.low < fixed[0], range.high > fixed[1]};
+        range = {fixed[0], fixed[1], range.low<fixed[0], range.high> fixed[1]};
     ensure(range.high > range.low, "the range of a picture's colours is empty");
 
     std::vector<Splat> splats;
@@ -360,8 +360,7 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         if (std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z))
             splats.push_back({float(camera.x(at)), float(camera.y(at)), float(camera.depth(at)), color});
     };
-    for (std::size_t k = 0; k < values.size(); ++k)
-        add(x[shown_soil[k]], pick(q.map, (values[k] - range.low) / (range.high - range.low)));
+    for (std::size_t k = 0; k < values.size(); ++k) add(x[shown_soil[k]], pick(q.map, (values[k] - range.low) / (range.high - range.low)));
     for (const Vector& w : walls.position) {
         bool seen = w.x > shown.low.x && w.x < shown.high.x && (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
                     w.z < shown.high.z && in_slice(w.y);

@@ -16,8 +16,8 @@ struct PictureLabel {
     Vector low, high;   // m, box to frame: where the soil stands, over all ranks
     double spacing = 0; // m, diameter of a particle
     std::string title;
-    double time = 0;              // s
-    double middle_y = 0;          // m, where View::Cut cuts
+    double time = 0;                // s
+    double middle_y = 0;            // m, where View::Cut cuts
     int width = 1600, height = 900; // pixels
 };
 

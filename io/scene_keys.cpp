@@ -364,7 +364,8 @@ std::vector<Key> make_keys()
          any,
          {},
          "[0.0, 1.0]",
-         "least and largest value of the colours (m, m/s, 1, Pa), the same in every picture; without it what the soil shows, anew each time",
+         "least and largest value of the colours (m, m/s, 1, Pa), the same in every picture; without it what the soil shows, anew each "
+         "time",
          book},
         {"output.movie", Flag, "", Default, "false", any, {}, "true", "the pictures as a film at the end (needs ffmpeg)", book},
     };

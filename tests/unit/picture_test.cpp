@@ -56,7 +56,8 @@ protected:
     Image draw(scene::View view, scene::Color color, int dimensions = 3, std::array<double, 2> range = {})
     {
         const auto box = io::soil_extent(alone, p);
-        io::write_picture(alone, dir / "p.png", p, walls, {{view, color, range}, dimensions, box.low, box.high, d, "title", 0.5, middle_y, 800, 450});
+        io::write_picture(alone, dir / "p.png", p, walls,
+                          {{view, color, range}, dimensions, box.low, box.high, d, "title", 0.5, middle_y, 800, 450});
         return load(dir / "p.png");
     }
     const double d = 0.1, middle_y = 0.4;
