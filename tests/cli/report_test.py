@@ -107,7 +107,7 @@ def page(directory, verdict, what, report=True):
     check(not missing, f"{what}: all sections {missing}")
     check(verdict in p.text, f"{what}: the verdict is '{verdict}'")
     check("script" not in p.tags, f"{what}: what users write stays text")
-    check("nan" not in re.sub(r"base64,[A-Za-z0-9+/=]*", "", text).lower().replace("finan", ""), f"{what}: no number that is none")
+    check(not re.search(r"\bnan\b", re.sub(r"base64,[A-Za-z0-9+/=]*", "", text), re.I), f"{what}: no number that is none")
     return p, text
 
 
@@ -168,7 +168,7 @@ try:
         check("ffmpeg" in r.stderr and "install" in r.stderr, "without ffmpeg the message says how to get it")
     if shutil.which("chromium"):
         wide = sideways("done")
-        check(wide == [0, 0], f"no window of 390 or 1280 pixels scrolls sideways {wide}")
+        check(isinstance(wide, list) and max(wide) <= 0, f"no window of 390 or 1280 pixels scrolls sideways {wide}")
     else:
         print("skipped  the layout in a browser: no chromium")
 finally:

@@ -125,10 +125,11 @@ std::string opening(const Record& r)
     const double wall = r.number("wall_seconds"), predicted = r.number("predicted_seconds");
     s += card("simulated", fmt::format("{} s", shown(std::isfinite(r.number("time")) ? r.number("time") : last(r.history, "time"))),
               grouped(std::isfinite(r.number("steps")) ? r.number("steps") : last(r.history, "step")) + " steps");
-    s += card("wall time", duration(wall),
-              std::isfinite(predicted) && predicted > 0 && std::isfinite(wall)
-                  ? fmt::format("predicted {} ({:+.0f} %)", duration(predicted), 100 * (predicted / wall - 1))
-                  : "");
+    // What was predicted is the whole run.
+    std::string before = predicted > 0 ? "predicted " + duration(predicted) : "";
+    if (predicted > 0 && wall > 0)
+        before += r.text("status") == "finished" ? fmt::format(" ({:+.0f} %)", 100 * (predicted / wall - 1)) : " for all of it";
+    s += card("wall time", duration(wall), before);
     s += card("soil particles", grouped(r.number("soil_particles")), grouped(r.number("wall_particles")) + " of walls");
     s += card("ranks \u00d7 threads", grouped(r.number("ranks")) + " \u00d7 " + grouped(r.number("threads")), r.text("precision"));
     s += card("speed", shown(r.number("particle_steps_per_second"), true) + "/s", "soil-particle steps");
