@@ -1,8 +1,6 @@
 #pragma once
-// history.csv: one row per interval, appended whole, cut back to the restart time without touching what came
-// before.
-#include "io/file.hpp"
-#include <optional>
+// history.csv: what the soil did, a row an interval; progress.csv: how fast the run went.
+#include "io/rows.hpp"
 
 namespace kuzure::io {
 
@@ -17,28 +15,31 @@ struct HistoryRow {
     double height, front_min_x, front_max_x, front_min_y, front_max_y;   // m
 };
 
-class History {
+class History : public Rows {
 public:
-    /// Collective. Starts a new file; with a restart time, goes on after the last row not later than it,
-    /// dropping later and torn rows. Throws IoFailed, also where the file is not a history of kuzure.
+    /// Collective. As Rows.
     History(const Team&, const Path& file, int dimensions, std::optional<double> restart_time = {});
-    ~History();
-    History(const History&) = delete;
-    History& operator=(const History&) = delete;
-
-    /// Collective; rank 0's row counts. The row is with the system when this returns. Throws IoFailed on all
-    /// ranks.
+    /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
     void append(const HistoryRow&);
-    /// Collective. The rows are on the disk when this returns: to be called before a checkpoint is written.
-    void sync();
-    /// Time of the last row in the file, if there is one: a restart must not write it again.
-    std::optional<double> last_time() const { return last_time_; }
+};
 
-private:
-    const Team& team_;
-    Path file_;
-    std::optional<double> last_time_;
-    int fd_ = -1; // rank 0 only
+/// How fast a run goes. It differs from run to run: nothing of it is in history.csv, whose bits do not.
+struct ProgressRow {
+    double time;             // s
+    std::int64_t step;       // 1
+    double dt;               // s
+    double wall;             // s since this start of the program
+    double steps_per_second; // 1/s since the row before
+    double balance;          // 1, busiest rank over the mean
+};
+
+/// progress.csv
+class ProgressLog : public Rows {
+public:
+    /// Collective. As Rows.
+    ProgressLog(const Team&, const Path& file, std::optional<double> restart_time = {});
+    /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
+    void append(const ProgressRow&);
 };
 
 } // namespace kuzure::io

@@ -15,25 +15,25 @@ constexpr double floor_margin = 0.12; // of the soil's extent, shown around it
 // ---- colours
 // ---------------------------------------------------------------------------------------------------------
 using Map = std::array<Rgb, 9>;
-/// Light to dark blue: the further, the darker.
+/// Light to dark blue: the further, the darker. Equal steps are equally far apart in CIELAB (10.1 +-0.2).
 constexpr Map blues = {{{196, 222, 245},
-                        {178, 211, 240},
-                        {154, 198, 232},
-                        {126, 183, 223},
-                        {94, 164, 208},
+                        {162, 202, 235},
+                        {124, 182, 222},
+                        {88, 159, 205},
                         {62, 138, 194},
-                        {34, 110, 176},
-                        {12, 80, 148},
+                        {40, 116, 180},
+                        {22, 93, 160},
+                        {11, 70, 135},
                         {8, 48, 107}}};
 /// Viridis (Smith and van der Walt 2015): equal steps look equal, also in grey.
 constexpr Map viridis = {{{68, 1, 84},
-                          {72, 40, 120},
-                          {62, 74, 137},
-                          {49, 104, 142},
-                          {38, 130, 142},
-                          {31, 158, 137},
-                          {53, 183, 121},
-                          {109, 205, 89},
+                          {71, 45, 123},
+                          {59, 82, 139},
+                          {44, 114, 142},
+                          {33, 145, 140},
+                          {40, 174, 128},
+                          {94, 201, 98},
+                          {173, 220, 48},
                           {253, 231, 37}}};
 constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48};
 
@@ -152,7 +152,7 @@ struct Camera {
     {
         double azimuth = -90, elevation = 0; // deg, where the eye stands
         if (view == scene::View::Oblique) azimuth = -60, elevation = 24;
-        if (view == scene::View::Top) elevation = 90;
+        if (view == scene::View::Top) elevation = 90; // Side and Cut: from the front
         const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
         right = {-std::sin(a), std::cos(a), 0};
         up = {-std::sin(e) * std::cos(a), -std::sin(e) * std::sin(a), std::cos(e)};
@@ -268,13 +268,18 @@ void color_bar(Canvas& canvas, const Quantity& q, const Range& range)
     const int width = 26, height = canvas.height() / 2, left = canvas.width() - 190, top = (canvas.height() - height) / 2 + 10;
     canvas.rectangle(left - 1, top - 1, width + 2, height + 2, ink);
     for (int y = 0; y < height; ++y) canvas.rectangle(left, top + y, width, 1, pick(q.map, 1 - (y + 0.5) / height));
-    const std::string unit = *q.unit ? fmt::format(" [{}]", q.unit) : "";
+    // Thousands and millions of a unit go into its name.
+    const double largest = std::max(std::fabs(range.low), std::fabs(range.high));
+    const bool scaled = std::string_view(q.unit) == "Pa";
+    const int power = !scaled || largest < 1e4 ? 0 : largest < 1e7 ? 3 : 6;
+    const std::string unit = *q.unit ? fmt::format(" [{}{}]", power == 3 ? "k" : power == 6 ? "M" : "", q.unit) : "";
+    const double factor = std::pow(10.0, -power);
     canvas.text(left + 65, top - 28, 15, q.name + unit, ink, Anchor::Middle);
     const double step = round_up((range.high - range.low) / 7);
     for (double v = std::ceil(range.low / step - 1e-9) * step; v <= range.high + 1e-9 * step; v += step) {
         const double y = top + height * (1 - (v - range.low) / (range.high - range.low));
         canvas.line(left + width, y, left + width + 7, y, 1.5, ink);
-        canvas.text(left + width + 14, y + 6.5, 13, number(v, step), ink);
+        canvas.text(left + width + 14, y + 6.5, 13, number(v * factor, step * factor), ink);
     }
     if (range.above) canvas.text(left + width / 2.0, top - 7, 11, "^", ink, Anchor::Middle);
     if (range.below) canvas.text(left + width / 2.0, top + height + 16, 11, "v", ink, Anchor::Middle);
@@ -322,7 +327,8 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
     ensure(label.spacing > 0, "a picture needs the particles' spacing");
     const bool flat = label.dimensions == 2;
     Camera camera(flat ? scene::View::Side : label.look.view);
-    const bool side = flat || label.look.view == scene::View::Side;
+    const bool cut = !flat && label.look.view == scene::View::Cut;
+    const bool side = flat || cut || label.look.view == scene::View::Side;
     const Quantity q = quantity(label.look.color);
     const double d = label.spacing;
 
@@ -336,24 +342,28 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
 
     // What each particle of this rank looks like.
     const auto n = p.size();
-    std::vector<double> values(std::size_t(n), 0.0);
-    for (Index i = 0; i < n; ++i) values[std::size_t(i)] = value(p, label.look.color, i);
+    const auto x = p[field::position];
+    const auto in_slice = [&](double y) { return !cut || std::fabs(y - label.middle_y) <= d; };
+    std::vector<Index> shown_soil;
+    std::vector<double> values;
+    for (Index i = 0; i < n; ++i)
+        if (in_slice(x.column[1][i])) shown_soil.push_back(i), values.push_back(value(p, label.look.color, i));
     Range range = natural_range(team, values, label.look.color, d);
-    if (label.range) range = {(*label.range)[0], (*label.range)[1], range.low<(*label.range)[0], range.high>(*label.range)[1]};
+    if (const auto& fixed = label.look.range; fixed != std::array<double, 2>{})
+        range = {fixed[0], fixed[1], range.low<fixed[0], range.high> fixed[1]};
     ensure(range.high > range.low, "the range of a picture's colours is empty");
 
     std::vector<Splat> splats;
-    splats.reserve(std::size_t(n) + walls.size());
-    const auto x = p[field::position];
+    splats.reserve(shown_soil.size() + walls.size());
     const auto add = [&](Vector at, Rgb color) {
         if (flat) at.y = 0;
         if (std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z))
             splats.push_back({float(camera.x(at)), float(camera.y(at)), float(camera.depth(at)), color});
     };
-    for (Index i = 0; i < n; ++i) add(x[i], pick(q.map, (values[std::size_t(i)] - range.low) / (range.high - range.low)));
+    for (std::size_t k = 0; k < values.size(); ++k) add(x[shown_soil[k]], pick(q.map, (values[k] - range.low) / (range.high - range.low)));
     for (const Vector& w : walls.position) {
         bool seen = w.x > shown.low.x && w.x < shown.high.x && (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
-                    w.z < shown.high.z;
+                    w.z < shown.high.z && in_slice(w.y);
         // A wall between the soil and the eye would hide what the picture is for.
         const bool above_floor = w.z > label.low.z - 0.25 * d;
         if (!flat && above_floor && w.y < label.low.y) seen = false;

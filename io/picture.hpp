@@ -16,9 +16,9 @@ struct PictureLabel {
     Vector low, high;   // m, box to frame: where the soil stands, over all ranks
     double spacing = 0; // m, diameter of a particle
     std::string title;
-    double time = 0;                            // s
-    std::optional<std::array<double, 2>> range; // of the colours; without it, what the soil shows
-    int width = 1600, height = 900;             // pixels
+    double time = 0;                // s
+    double middle_y = 0;            // m, where View::Cut cuts
+    int width = 1600, height = 900; // pixels
 };
 
 /// The box around the soil of all ranks. Collective. A point at the origin where there is none.

@@ -22,6 +22,7 @@ public:
     Path scene() const { return path_ / "scene.toml"; }
     Path snapshots() const { return path_ / "snapshots"; }
     Path history() const { return path_ / "history.csv"; }
+    Path progress() const { return path_ / "progress.csv"; }
     Path summary() const { return path_ / "summary.json"; }
     Path stop() const { return path_ / "STOP"; }
 

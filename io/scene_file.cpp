@@ -137,7 +137,9 @@ template <class A> void describe(A& a, Scene& s)
     a.table("output.picture", s.output.picture, [&](auto& v) {
         a.choice("output.picture.view", v.view);
         a.choice("output.picture.color", v.color);
+        a.pair("output.picture.range", v.range);
     });
+    a.flag("output.movie", s.output.movie);
 }
 
 /// Fills a scene from a document that check() has approved.

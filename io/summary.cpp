@@ -34,6 +34,11 @@ ordered_json to_json(const Summary& s)
         {"energy", energy},
         {"effects", effects_json(s.effects)},
         {"state_hash", s.state_hash},
+        {"host", s.host},
+        {"hosts", s.hosts},
+        {"predicted_seconds", s.predicted_seconds},
+        {"predicted_interval", {s.predicted_low, s.predicted_high}},
+        {"warnings", s.warnings},
     };
     if (!s.message.empty()) all["message"] = s.message;
     return all;

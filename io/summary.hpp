@@ -21,7 +21,11 @@ struct Summary {
     std::vector<std::pair<std::string, double>> energy; // name, J
     std::vector<scene::EffectNote> effects;
     std::string state_hash;
-    std::string message; // why it ended, where that is not plain; left out when empty
+    std::string host; // of rank 0
+    int hosts = 1;
+    std::vector<std::string> warnings;
+    double predicted_seconds = 0, predicted_low = 0, predicted_high = 0; // s, said at the start, of this start of the program
+    std::string message;                                                 // why it ended, where that is not plain; left out when empty
 };
 
 /// {"on": [{name, why}], "off": [{name, why}]}, as summary.json and `kuzure check --json` show it.

@@ -166,16 +166,29 @@ std::filesystem::path machine_cache()
     return {};
 }
 
+namespace {
+std::filesystem::path kept_file(std::string_view instruction_set, int threads, const std::filesystem::path& cache)
+{
+    return cache / as_file_name(fmt::format("machine-{}-{}-{}.json", host_name(), instruction_set, threads));
+}
+} // namespace
+
+std::optional<Machine> kept_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache)
+{
+    if (cache.empty()) return {};
+    std::ifstream kept(kept_file(instruction_set, threads, cache));
+    if (!kept) return {};
+    const std::string text(std::istreambuf_iterator<char>(kept), {});
+    const auto m = machine_from_json(text);
+    if (m && m->host == host_name() && m->cpu == cpu_name() && m->instruction_set == instruction_set && m->threads == threads) return m;
+    return {};
+}
+
 Machine this_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache)
 {
+    if (const auto kept = kept_machine(instruction_set, threads, cache)) return *kept;
     if (cache.empty()) return measure_machine(instruction_set, threads);
-    const auto file = cache / as_file_name(fmt::format("machine-{}-{}-{}.json", host_name(), instruction_set, threads));
-    if (std::ifstream kept(file); kept) {
-        const std::string text(std::istreambuf_iterator<char>(kept), {});
-        if (const auto m = machine_from_json(text);
-            m && m->host == host_name() && m->cpu == cpu_name() && m->instruction_set == instruction_set && m->threads == threads)
-            return *m;
-    }
+    const auto file = kept_file(instruction_set, threads, cache);
     const Machine measured = measure_machine(instruction_set, threads);
     std::error_code ignored;
     std::filesystem::create_directories(cache, ignored);

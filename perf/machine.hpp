@@ -30,6 +30,8 @@ Machine measure_machine(std::string_view instruction_set, int threads);
 
 /// Directory of kept measurements: $XDG_CACHE_HOME/kuzure or ~/.cache/kuzure; empty where neither is known.
 std::filesystem::path machine_cache();
+/// The kept measurement of this host, processor, instruction set and thread count, if there is one. Measures nothing.
+std::optional<Machine> kept_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache = machine_cache());
 /// The kept measurement of this host, processor, instruction set and thread count; else measure and keep it.
 /// A cache that cannot be read or written is no error: it is measured again.
 Machine this_machine(std::string_view instruction_set, int threads, const std::filesystem::path& cache = machine_cache());

@@ -16,6 +16,7 @@ nlohmann::ordered_json as_json(const PhaseRow& row)
         j["gflop_per_second"] = row.gflops();
         j["flop_per_byte"] = row.intensity();
     }
+    if (row.bytes > 0) j["gbyte_per_second"] = row.gbytes();
     return j;
 }
 

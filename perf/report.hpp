@@ -33,6 +33,8 @@ struct PhaseRow {
     double flops = 0, bytes = 0;       // sums over the ranks
     /// 1e9 operations a second of all ranks while the slowest takes its time; 0 where nothing was counted.
     double gflops() const { return max > 0 ? flops / max * 1e-9 : 0; }
+    /// 1e9 bytes a second, likewise.
+    double gbytes() const { return max > 0 ? bytes / max * 1e-9 : 0; }
     /// Operations per byte moved; 0 where nothing was counted.
     double intensity() const { return bytes > 0 ? flops / bytes : 0; }
 };

@@ -17,6 +17,7 @@ struct Estimate {
     double checkpoint; // bytes of one
     double snapshots;  // how many
     double history;    // bytes
+    double history_rows;
     double pairs;      // directed pairs of all steps
     double record;     // bytes of a ghost particle, sent every step
     double support;    // radius in which particles see each other, spacings
@@ -25,6 +26,8 @@ struct Estimate {
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
     double disk() const { return snapshots * snapshot + 3 * checkpoint + history; }
 };
+/// Neighbours inside the support of one soil particle, walls included: mean over the scene as filled.
+double neighbours_at_start(const Scene&, const scene::Filling&);
 Estimate estimate(const Scene&, const scene::Filling&, const PairModel&);
 
 /// Bytes that every process takes before its first particle: MPI, HDF5, the program.

@@ -565,6 +565,10 @@ void Simulation::rebuild(bool sort_anew)
             sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
             p.gather(sorted_.order);
         });
+        // every column read and written once
+        timers_.did(Phase::Sort, 0,
+                    2.0 * double(scene::column_bytes(filling_)) * double(p.size()) /
+                        double(std::max<std::int64_t>(1, filling_.soil_count())));
     });
     timers_.timed(Phase::Ghosts, [&] {
         halo_.emplace(comm_, domain_.plan_halo(std::as_const(p)[field::sorted_position], p.size(), reach_), row_bytes(*model_));
@@ -593,6 +597,9 @@ void Simulation::rebuild(bool sort_anew)
         lists_.build(columns_, owned, ghosts, walls_, reach_, model_->cluster_width());
         make_records();
     });
+    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its place and record.
+    const auto entries = double(lists_.entries() + lists_.wall_entries());
+    timers_.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + row_bytes()));
     if (sort_anew) clock_.extremes.moved2 = 0;
     pruned_margin_ = 0;
     built_ = true;

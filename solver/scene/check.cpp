@@ -338,6 +338,10 @@ void check_plausible(const Scene& scene, Rules& rules)
                 key, text("{:.3g} s is shorter than a step ({:.3g} s): every step writes a {}, {:.3g} of them", *every, step, what, steps));
     };
     interval("output.every", scene.output.every, "snapshot");
+    if (const auto& p = scene.output.picture; p && p->range != std::array<double, 2>{} && !(p->range[0] < p->range[1]))
+        rules.error("output.picture.range", text("expected [least, largest], found [{}, {}]; exchange them", p->range[0], p->range[1]));
+    if (scene.output.movie && !scene.output.picture)
+        rules.error("output.movie", "a film is made of pictures, and there are none; add picture = {} to [output]");
     interval("output.history", scene.output.history, "row");
 }
 

@@ -14,11 +14,12 @@ struct Accuracy {
     bool operator==(const Accuracy&) const = default;
 };
 
-enum class View { Oblique, Side, Top };
+enum class View { Oblique, Side, Top, Cut }; // Cut: a slice along x through the soil's middle, seen from the side
 enum class Color { Displacement, Speed, PlasticStrain, Pressure };
 struct Picture {
     View view = View::Oblique;
     Color color = Color::Displacement;
+    std::array<double, 2> range{}; // of the colours, in the colour's unit; 0, 0: what the soil shows, anew in every picture
     bool operator==(const Picture&) const = default;
 };
 struct Output {
@@ -29,6 +30,7 @@ struct Output {
     std::optional<double> grain;   // m, column height at which a front counts; absent: one spacing
     double checkpoint_minutes = 30;
     std::optional<Picture> picture;
+    bool movie = false; // the pictures as one film at the end of the run
     bool operator==(const Output&) const = default;
 };
 

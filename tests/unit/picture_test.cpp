@@ -53,13 +53,14 @@ protected:
         walls.density.resize(walls.size());
     }
     void TearDown() override { std::filesystem::remove_all(dir); }
-    Image draw(scene::View view, scene::Color color, int dimensions = 3)
+    Image draw(scene::View view, scene::Color color, int dimensions = 3, std::array<double, 2> range = {})
     {
         const auto box = io::soil_extent(alone, p);
-        io::write_picture(alone, dir / "p.png", p, walls, {{view, color}, dimensions, box.low, box.high, d, "title", 0.5, {}, 800, 450});
+        io::write_picture(alone, dir / "p.png", p, walls,
+                          {{view, color, range}, dimensions, box.low, box.high, d, "title", 0.5, middle_y, 800, 450});
         return load(dir / "p.png");
     }
-    const double d = 0.1;
+    const double d = 0.1, middle_y = 0.4;
     io::Path dir;
     Particles p;
     io::WallPoints walls;
@@ -69,7 +70,7 @@ protected:
 
 TEST_F(PictureTest, SoilIsBlueOnBrownGround)
 {
-    for (const auto view : {scene::View::Oblique, scene::View::Side, scene::View::Top}) {
+    for (const auto view : {scene::View::Oblique, scene::View::Side, scene::View::Top, scene::View::Cut}) {
         const Image im = draw(view, scene::Color::Displacement);
         ASSERT_EQ(im.width, 800);
         ASSERT_EQ(im.height, 450);

@@ -2,36 +2,17 @@
 #include "solver/scene/check.hpp"
 #include "io/summary.hpp"
 #include "solver/app/command.hpp"
-#include "solver/app/estimate.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/app/forecast.hpp"
+#include "solver/app/predict.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <omp.h>
 
 namespace kuzure {
 
 namespace {
-
-/// Seconds a directed pair takes here and now, with all cores: a few steps of a small block of the scene's own soil and kernel.
-double measure_pair(const Comm& comm, Scene s)
-{
-    const double edge = (s.dimensions == 3 ? 20 : 90) * s.space.spacing;
-    s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
-    s.walls.clear();
-    s.bodies.resize(1);
-    s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
-    s.time = {1.0, 1e-3 * scene::crossing_time(s)};
-    use_threads(comm, 0);
-    Simulation sim(comm, s);
-    for (int k = 0; k < 3; ++k) sim.step();
-    const auto pairs = sim.pairs();
-    const double begin = omp_get_wtime();
-    for (int k = 0; k < 6; ++k) sim.step();
-    return (omp_get_wtime() - begin) / double(std::max<std::int64_t>(1, sim.pairs() - pairs));
-}
 
 /// As JSON has whole numbers.
 std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
@@ -53,8 +34,15 @@ void add_check(CLI::App& app, Action& chosen)
     auto* command = app.add_subcommand("check", "what will be simulated and why; runs nothing");
     auto args = std::make_shared<SceneArguments>();
     auto json = std::make_shared<bool>(false);
+    auto machine = std::make_shared<std::string>();
+    auto ranks = std::make_shared<int>(0);
     args->add_to(*command);
     command->add_flag("--json", *json, "as JSON");
+    auto* profile =
+        command->add_option("--machine", *machine, "predict for a profile of jobs/machines, or the path of one")->type_name("NAME");
+    command->add_option("--ranks", *ranks, "ranks on that machine (default: one node full)")
+        ->needs(profile)
+        ->check(CLI::Range(1, 1000000000));
     command->callback([=, &chosen] {
         chosen = [=](const Comm& comm) {
             const Scene s = args->read(comm);
@@ -62,13 +50,25 @@ void add_check(CLI::App& app, Action& chosen)
             const auto model = choose_model(s, Arithmetic::Lanes);
             const Estimate e = estimate(s, filling, *model);
             const double memory = e.memory + bytes_per_process * comm.size();
-            // lists, sorting and output took 9 % on top of the pass in hirata_52 (docs/performance.md)
-            const double seconds = e.pairs * measure_pair(comm, s) * 1.09;
+            Forecast time;
+            std::string where_text = "this machine as it is now";
+            if (!machine->empty()) {
+                const auto m = machine_named(*machine);
+                const int all = *ranks > 0 ? *ranks : m.node.ranks, per_node = std::min(all, m.node.ranks);
+                const int nodes = (all + per_node - 1) / per_node;
+                time.seconds = predict_seconds(e, m, nodes, per_node);
+                // A profile's constants were measured on other days and scenes: half as much again either way.
+                time.low = time.seconds / 1.5, time.high = time.seconds * 1.5;
+                where_text = fmt::format("{}, {} ranks on {} nodes, outputs left out", m.name, all, nodes);
+            } else {
+                use_threads(comm, 0);
+                time = forecast(comm, s, filling, e);
+            }
             std::vector<std::string> warnings;
             for (const auto& issue : scene::check(s, args->force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
                 warnings.push_back(issue.key + ": " + issue.text);
             const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
-            if (const auto why = does_not_fit(comm, e, where); !why.empty())
+            if (const auto why = machine->empty() ? does_not_fit(comm, e, where) : std::string(); !why.empty())
                 warnings.push_back("on this machine kuzure run would refuse this scene: " + why);
             if (comm.rank() != 0) return Exit::Ok;
             const auto judgements = scene::judge(s, filling);
@@ -81,7 +81,8 @@ void add_check(CLI::App& app, Action& chosen)
                                          {"steps", e.steps},
                                          {"memory_bytes", whole(memory)},
                                          {"disk_bytes", whole(e.disk())},
-                                         {"predicted_seconds", seconds},
+                                         {"predicted_seconds", time.seconds},
+                                         {"predicted_interval", {time.low, time.high}},
                                          {"effects", io::effects_json(s.notes)},
                                          {"numbers", numbers},
                                          {"warnings", warnings}};
@@ -94,7 +95,7 @@ void add_check(CLI::App& app, Action& chosen)
                        s.time.step ? "" : "about ", e.steps, s.time.end);
             fmt::print("  pair model  {}\n", model->name());
             fmt::print("  memory      {} in all, disk {}\n", bytes_text(memory), bytes_text(e.disk()));
-            fmt::print("  time        about {:.1f} minutes on this machine\n\n", seconds / 60);
+            fmt::print("  time        about {} on {}\n\n", forecast_text(time), where_text);
             for (const auto& n : s.notes) fmt::print("  {:<4}{}: {}\n", n.on ? "on" : "off", n.name, n.why);
             fmt::print("\n");
             for (const auto& n : judgements) fmt::print("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);

@@ -7,9 +7,12 @@
 #include "io/summary.hpp"
 #include "perf/report.hpp"
 #include "solver/app/command.hpp"
-#include "solver/app/estimate.hpp"
+#include "solver/app/forecast.hpp"
 #include "solver/app/measure.hpp"
+#include "solver/app/report/movie.hpp"
+#include "solver/app/report/report.hpp"
 #include "solver/app/simulation.hpp"
+#include "solver/app/status.hpp"
 #include "solver/core/simd.hpp"
 #include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
@@ -92,44 +95,6 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::
     return w;
 }
 
-/// One line on the terminal, or plain lines at intervals in a log.
-class Progress {
-public:
-    Progress(bool speaks, double end) : speaks_(speaks), bar_(terminal()), end_(end), start_(now()), last_(start_) {}
-    void show(const Simulation& sim, double residual, bool final = false)
-    {
-        if (!speaks_) return;
-        const double t = now();
-        if (!final && t - last_ < (bar_ ? 0.5 : 10.0)) return;
-        const double rate = (sim.steps() - first_step_) / std::max(t - start_, 1e-9);
-        const double done = std::min(sim.time() / end_, 1.0);
-        const double left = sim.time() > first_time_ ? (t - start_) * (end_ - sim.time()) / (sim.time() - first_time_) : 0;
-        std::string line =
-            fmt::format("t {:.4f} of {:g} s  step {}  dt {:.2e}  {:.1f} steps/s  max {:.2f} m/s  residual {:+.2e}  {:.0f} s left",
-                        sim.time(), end_, sim.steps(), sim.dt(), rate, sim.max_speed(), residual, left);
-        if (sim.comm().size() > 1) line += fmt::format("  imbalance {:.2f}", sim.structure().imbalance);
-        if (bar_) {
-            const int width = 20, full = int(done * width);
-            fmt::print("\r[{}{}] {}\x1b[K{}", std::string(full, '#'), std::string(width - full, '.'), line, final ? "\n" : "");
-        } else fmt::print("{:3.0f} %  {}\n", 100 * done, line);
-        std::fflush(stdout);
-        last_ = t;
-    }
-    void from(const Simulation& sim) { first_step_ = sim.steps(), first_time_ = sim.time(); }
-
-private:
-    /// mpirun's ranks always write to a pseudo-terminal; who sends that into a file says TERM=dumb.
-    static bool terminal()
-    {
-        const char* kind = std::getenv("TERM");
-        return isatty(1) != 0 && kind && std::string_view(kind) != "dumb";
-    }
-    bool speaks_, bar_;
-    double end_, start_, last_;
-    std::int64_t first_step_ = 0;
-    double first_time_ = 0;
-};
-
 class Run {
 public:
     Run(const Comm& comm, const Arguments& a)
@@ -150,10 +115,16 @@ private:
         if (speaks_) fmt::print("{}\n", text), std::fflush(stdout);
     }
 
+    void warn(const std::string& text)
+    {
+        warnings_.push_back(text);
+        if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}\n", text);
+    }
+
     void open()
     {
         for (const auto& issue : scene::check(scene_, args_.scene.force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
-            if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}: {}\n", issue.key, issue.text);
+            warn(issue.key + ": " + issue.text);
         const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
         if (args_.restart) {
@@ -163,7 +134,13 @@ private:
         }
         if (from) require_same_scene(*from, hash_);
         const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
-        fits_or_throw(where, from ? clock_from(from->header, from->file).time / scene_.time.end : 0);
+        const double done = from ? std::clamp(clock_from(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
+        {
+            const scene::Filling filling(scene_);
+            const Estimate e = estimate(scene_, filling, *choose_model(scene_, options.arithmetic));
+            fits_or_throw(e, where, done);
+            forecast_ = forecast(comm_, scene_, filling, e, done);
+        }
         std::optional<double> restart_time;
         if (from) {
             Particles p;
@@ -190,18 +167,19 @@ private:
         walls_ = wall_share(comm_, sim_->filling(), {sim_->soils().begin(), sim_->soils().end()});
         snapshots_.emplace(comm_, dir_->snapshots(), restart_time);
         history_.emplace(comm_, dir_->history(), scene_.dimensions, restart_time);
+        progress_.emplace(comm_, dir_->progress(), restart_time);
         say(fmt::format("{}: {} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title, sim_->filling().soil_count(),
                         sim_->filling().wall_count(), comm_.size(), threads_, sim_->model().name()));
+        say(fmt::format("predicted: {}", forecast_text(forecast_)));
     }
 
     /// Before anything is allocated or written: a run that must end with full memory or a full disk does not begin.
-    void fits_or_throw(const io::Path& where, double done) const
+    void fits_or_throw(const Estimate& e, const io::Path& where, double done)
     {
-        const auto model = choose_model(scene_, args_.plain ? Arithmetic::Plain : Arithmetic::Lanes);
-        const auto why = does_not_fit(comm_, estimate(scene_, scene::Filling(scene_), *model), where, std::clamp(done, 0.0, 1.0));
+        const auto why = does_not_fit(comm_, e, where, done);
         if (why.empty()) return;
         if (!args_.force_size) throw BadInput(fmt::format("{}: this run does not fit: {}; or --force-size to try", args_.scene.file, why));
-        if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}; going on as told by --force-size\n", why);
+        warn(why + "; going on as told by --force-size");
     }
 
     /// True if something that comes every `interval` s is due at this step and was not there at the one before.
@@ -216,6 +194,7 @@ private:
     {
         Simulation& sim = *sim_;
         const double t = sim.time();
+        if (before < 0 || last || due(scene_.time.end / 400, t, before)) log_progress();
         if (due(scene_.output.history, t, before) || last) {
             if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(); });
         }
@@ -229,14 +208,28 @@ private:
         }
     }
 
+    void log_progress()
+    {
+        const double wall = now() - start_;
+        const double rate = wall > logged_wall_ ? double(sim_->steps() - logged_step_) / (wall - logged_wall_) : 0;
+        if (!progress_->last_time() || sim_->time() > *progress_->last_time())
+            progress_->append({sim_->time(), sim_->steps(), sim_->dt(), wall, sim_->steps() > logged_step_ ? rate : std::nan(""),
+                               sim_->structure().imbalance});
+        logged_wall_ = wall, logged_step_ = sim_->steps();
+    }
+
     void write_history()
     {
         const Ledger l = sim_->ledger();
-        const Heap heap = measure_heap(comm_, sim_->particles(), scene_, sim_->filling());
+        heap_ = measure_heap(comm_, sim_->particles(), scene_, sim_->filling());
+        const Heap& heap = *heap_;
         residual_ = sim_->residual(l);
+        // energy.cpp's sums, and the columns they and the heap read
+        const auto n = double(sim_->particles().size());
+        sim_->timers().did(Phase::History, 45 * n, 20 * 8 * n);
         history_->append({sim_->time(), sim_->steps(), sim_->dt(), l.state.kinetic, l.state.potential, l.state.elastic,
-                          l.dissipated.plastic, l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, residual_, sim_->max_speed(),
-                          heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y});
+                          l.dissipated.plastic, l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_,
+                          sim_->max_speed(), heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y});
     }
 
     void write_picture(int number)
@@ -249,6 +242,8 @@ private:
         label.spacing = scene_.space.spacing;
         label.title = scene_.title;
         label.time = sim_->time();
+        const auto& start = sim_->filling().soil_bounds();
+        label.middle_y = 0.5 * (start.low.y + start.high.y);
         io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
     }
 
@@ -283,6 +278,8 @@ private:
         s.effects = scene_.notes;
         s.state_hash = state_hash(comm_, sim_->particles());
         s.message = message;
+        s.host = host_name(), s.hosts = comm_.node_place().nodes, s.warnings = warnings_;
+        s.predicted_seconds = forecast_.seconds, s.predicted_low = forecast_.low, s.predicted_high = forecast_.high;
         const std::int64_t memory = comm_.max(std::int64_t(sim_->memory_bytes()));
         auto j = io::to_json(s);
         j["memory_bytes_per_rank"] = memory;
@@ -295,10 +292,41 @@ private:
         io::write_json(comm_, dir_->summary(), j);
 
         auto report = phase_report(sim_->timers(), work, threads_, comm_);
+        // The roofs of this machine: those kept, or measured now if nobody waits for it and it does not weigh.
+        const int on_node = threads_ * comm_.node_place().size;
+        if (comm_.rank() == 0) report.machine = kept_machine(instruction_set(), on_node);
+        if (!report.machine && comm_.size() == 1 && loop_seconds_ > 20) report.machine = this_machine(instruction_set(), on_node);
         io::on_root(comm_, [&] {
             io::write_atomically(dir_->path() / "timers.json", report.json());
             io::write_atomically(dir_->path() / "timers.txt", report.text());
         });
+    }
+
+    /// What people look at. The results are complete without it: trouble here is said and nothing more.
+    void write_report()
+    {
+        if (comm_.rank() != 0) return;
+        try {
+            if (scene_.output.movie) say(fmt::format("film: {}", report::write_movie(dir_->path()).string()));
+        } catch (const std::exception& e) {
+            fmt::print(stderr, "kuzure: warning: {}\n", e.what());
+        }
+        try {
+            report::write_report(dir_->path());
+        } catch (const std::exception& e) {
+            fmt::print(stderr, "kuzure: warning: no report.html: {}\n", e.what());
+        }
+    }
+
+    /// What a run took against what was said before, and where its report is.
+    void say_end(const std::string& how) const
+    {
+        const double took = now() - start_;
+        say(how);
+        if (forecast_.seconds > 0)
+            say(fmt::format("took {:.1f} s, predicted {:.1f} s ({:+.0f} %)", took, forecast_.seconds,
+                            100 * (forecast_.seconds / took - 1)));
+        say(fmt::format("report: {}", (dir_->path() / "report.html").string()));
     }
 
     Wishes wishes()
@@ -331,6 +359,7 @@ private:
             // What was written after the good state is taken back.
             snapshots_.emplace(comm_, dir_->snapshots(), sim_->time());
             history_.emplace(comm_, dir_->history(), scene_.dimensions, sim_->time());
+            progress_.emplace(comm_, dir_->progress(), sim_->time());
             retries_.push_back({{"failed_time", time}, {"failed_step", step}, {"from_time", sim_->time()}, {"message", e.what()}});
             say(fmt::format("retry: {}. Back to t = {:g} s, on with half the step", e.what(), sim_->time()));
             return {};
@@ -341,9 +370,15 @@ private:
     {
         std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
         Simulation& sim = *sim_;
-        Progress progress(speaks_, scene_.time.end);
-        progress.from(sim);
-        first_step_ = sim.steps();
+        StatusLine status(speaks_, scene_.time.end, sim.time(), sim.steps());
+        const auto look = [&](bool final) {
+            if (!status.due(final)) return;
+            status.show({sim.time(), sim.steps(), sim.dt(), sim.max_speed(), residual_, heap_, scene_.dimensions, comm_.size(),
+                         sim.structure().imbalance},
+                        final);
+        };
+        first_step_ = logged_step_ = sim.steps();
+        logged_wall_ = now() - start_;
         last_checkpoint_ = now();
         const double begin = now();
         try {
@@ -353,11 +388,12 @@ private:
                 const Wishes w = advance();
                 loop_seconds_ = now() - begin;
                 outputs(before, sim.finished());
-                progress.show(sim, residual_);
+                look(false);
                 if (w.stop && !sim.finished()) {
                     write_checkpoint();
+                    look(true);
                     write_summary("stopped", Exit::Stopped);
-                    progress.show(sim, residual_, true);
+                    write_report();
                     say(fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim.time(),
                                     sim.steps(), checkpoint_.string()));
                     return Exit::Stopped;
@@ -367,6 +403,7 @@ private:
             write_checkpoint();
         } catch (const NumbersFailed& e) {
             loop_seconds_ = now() - begin;
+            look(true);
             std::string text = e.what();
             try {
                 snapshots_->write(sim.particles(), walls_,
@@ -374,6 +411,7 @@ private:
                 text += fmt::format(". The moment is in the last snapshot of {}", dir_->snapshots().string());
                 text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
                 write_summary("numbers failed", Exit::NumbersFailed, text);
+                write_report();
             } catch (const IoFailed& io) {
                 text += fmt::format(". It could not be saved: {}", io.what());
             }
@@ -384,11 +422,12 @@ private:
                 text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
             throw IoFailed(text);
         }
+        look(true);
         write_summary("finished", Exit::Ok);
-        progress.show(sim, residual_, true);
-        say(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {:+.2e}; results in {}", sim.steps() - first_step_,
-                        now() - start_, 1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)), residual_,
-                        dir_->path().string()));
+        write_report();
+        say_end(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {}; results in {}", sim.steps() - first_step_,
+                            loop_seconds_, 1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)),
+                            residual_ ? fmt::format("{:+.2e}", *residual_) : "unknown", dir_->path().string()));
         return Exit::Ok;
     }
 
@@ -404,10 +443,15 @@ private:
     io::WallPoints walls_;
     std::optional<io::Snapshots> snapshots_;
     std::optional<io::History> history_;
+    std::optional<io::ProgressLog> progress_;
     io::Path checkpoint_;
-    double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, residual_ = 0;
+    double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, logged_wall_ = 0;
+    std::optional<double> residual_; // of the last row of the history
+    std::optional<Heap> heap_;
+    Forecast forecast_;
+    std::vector<std::string> warnings_;
     bool stop_file_ = false;
-    std::int64_t first_step_ = 0;
+    std::int64_t first_step_ = 0, logged_step_ = 0;
     std::vector<nlohmann::ordered_json> retries_;
 };
 

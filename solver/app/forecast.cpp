@@ -1,0 +1,138 @@
+#include "solver/app/forecast.hpp"
+#include "solver/app/simulation.hpp"
+#include "solver/scene/check.hpp"
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <omp.h>
+
+namespace kuzure {
+
+namespace {
+
+// What cannot be measured in a moment, from runs of hirata_52 on the machine of docs/performance.md. Elsewhere it is taken to be
+// slower or faster as `chain_seconds` is.
+constexpr double reference_chain = 4.07e-3; // s
+constexpr double history_particle = 30e-9;  // s a soil particle of a rank and row
+constexpr double picture_base = 0.35;       // s
+constexpr double picture_particle = 1.0e-6; // s a particle of soil and walls
+constexpr double file_byte = 2.5e-9;        // s
+
+/// A chain of a million multiplications and shifts on one core, s: how fast this core is now, whatever else runs here.
+double chain_seconds()
+{
+    const double begin = omp_get_wtime();
+    std::uint64_t z = 1;
+    for (int k = 0; k < 1000000; ++k) {
+        z += 0x9e3779b97f4a7c15ull;
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+        z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+        z ^= z >> 31;
+    }
+    volatile std::uint64_t sink = z;
+    (void)sink;
+    return omp_get_wtime() - begin;
+}
+
+struct Measured {
+    std::vector<double> pair;    // s a directed pair, update included; one a round
+    double rebuild_particle = 0; // s a soil particle
+};
+
+/// A few steps of a block of the scene's own soil and kernel, its lattice shaken as soil in motion is.
+Measured measure(const Comm& comm, Scene s, std::int64_t soil)
+{
+    // So many particles that every rank has what a small run has, and no more than the scene itself.
+    const double wanted = double(std::clamp<std::int64_t>(soil, 216, 8000 * std::int64_t(comm.size())));
+    const double points = std::round(s.dimensions == 3 ? std::cbrt(wanted) : std::sqrt(wanted)), edge = points * s.space.spacing;
+    const double shake = 0.1 * s.space.spacing;
+    s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
+    s.walls.clear();
+    s.bodies.resize(1);
+    s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
+    s.time = {1.0, 1e-3 * scene::crossing_time(s)};
+    RunOptions options;
+    options.initial = [&](Particles& p) {
+        for (Index i = 0; i < p.size(); ++i) {
+            // three numbers in -1 .. 1 from the id, the same for any ranks
+            auto bits = std::uint64_t(p[field::id][i] + 1) * 0x9e3779b97f4a7c15ull;
+            Vector x = p[field::position][i];
+            for (double* c : {&x.x, &x.y, &x.z}) {
+                bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9ull;
+                if (s.dimensions == 3 || c != &x.y) *c += shake * (double(bits >> 11) * 0x1p-52 - 1);
+            }
+            p[field::position].set(i, x);
+        }
+    };
+    Simulation sim(comm, s, options);
+    Measured m;
+    for (int k = 0; k < 2; ++k) sim.step();
+    const auto& t = sim.timers();
+    const double rebuild = t.seconds(Phase::Migrate) + t.seconds(Phase::Sort) + t.seconds(Phase::Ghosts) + t.seconds(Phase::Lists);
+    m.rebuild_particle = comm.max(rebuild) / std::max<double>(1, double(sim.filling().soil_count()) *
+                                                                     double(std::max<std::int64_t>(1, sim.structure().rebuilds)));
+    // Rounds of about 30 ms each: as many steps as that takes.
+    const double first = comm.max(t.seconds(Phase::Interior) + t.seconds(Phase::Rim)) / 2;
+    const int steps = std::clamp(int(0.03 / std::max(first, 1e-6)), 2, 50);
+    for (int round = 0; round < 7; ++round) {
+        const auto pairs = sim.pairs();
+        const double begin = omp_get_wtime();
+        for (int k = 0; k < steps; ++k) sim.step();
+        const double seconds = comm.max(omp_get_wtime() - begin);
+        m.pair.push_back(seconds / double(std::max<std::int64_t>(1, sim.pairs() - pairs)));
+    }
+    std::sort(m.pair.begin(), m.pair.end());
+    return m;
+}
+
+/// How often the lists are made anew: whenever the fastest particle has gone half a skin. It speeds up as if it fell at
+/// three quarters of g, moves with 0.8 sqrt(g H) until about 3 sqrt(H/g), and slowly creeps then.
+double rebuilds(const Scene& s, const scene::Filling& f, double steps)
+{
+    double fastest = 0;
+    for (const auto& b : s.bodies) fastest = std::max(fastest, length(b.velocity));
+    double way = fastest * s.time.end;
+    if (s.effects.gravity) {
+        const double g = length(*s.effects.gravity), height = f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing;
+        const double top = 0.8 * std::sqrt(g * height), until = top / (0.75 * g), slow = 3 * std::sqrt(height / g), t = s.time.end;
+        if (g > 0) {
+            way += 0.5 * 0.75 * g * std::pow(std::min(t, until), 2);
+            if (t > until) way += top * (std::min(t, slow) - until);
+            if (t > slow) way += 0.1 * top * (t - slow);
+        }
+    }
+    const double half_skin = 0.5 * s.accuracy.skin * s.support();
+    return std::clamp(half_skin > 0 ? way / half_skin : steps, 1.0, std::max(1.0, steps));
+}
+
+} // namespace
+
+Forecast forecast(const Comm& comm, const Scene& s, const scene::Filling& f, const Estimate& e, double done)
+{
+    const double begin = omp_get_wtime();
+    const Measured m = measure(comm, s, e.soil);
+    const double pair = m.pair[m.pair.size() / 2], slower = chain_seconds() / reference_chain;
+    const double soil = double(e.soil), in_steps = e.pairs * (1 - done) * pair;
+    const double lists = rebuilds(s, f, double(e.steps)) * (1 - done) * soil * m.rebuild_particle;
+    const double rows = e.history_rows * soil / comm.size() * history_particle;
+    const double pictures = s.output.picture ? e.snapshots * (picture_base + picture_particle * double(e.soil + e.walls)) : 0;
+    const double files = (e.snapshots * e.snapshot + (1 - done) * e.checkpoint) * file_byte;
+    const double rest = lists + slower * ((1 - done) * (rows + pictures) + files) + 2 * (omp_get_wtime() - begin);
+    Forecast out;
+    out.pair_nanoseconds = 1e9 * pair;
+    out.seconds = in_steps + rest;
+    // What the rounds differed by, and a tenth for what the model leaves out.
+    out.low = 0.9 * (in_steps * m.pair.front() / pair + rest), out.high = 1.1 * (in_steps * m.pair.back() / pair + rest);
+    // Clocks differ between ranks: the root's word counts.
+    double all[] = {out.seconds, out.low, out.high, out.pair_nanoseconds};
+    comm.broadcast(std::as_writable_bytes(std::span<double>(all)));
+    return {all[0], all[1], all[2], all[3]};
+}
+
+std::string forecast_text(const Forecast& f)
+{
+    const auto in = f.high < 100 ? std::pair{1.0, "seconds"} : f.high < 6000 ? std::pair{60.0, "minutes"} : std::pair{3600.0, "hours"};
+    return fmt::format("{:.1f} {} ({:.1f} to {:.1f})", f.seconds / in.first, in.second, f.low / in.first, f.high / in.first);
+}
+
+} // namespace kuzure

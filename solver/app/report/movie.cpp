@@ -1,0 +1,87 @@
+#include "solver/app/report/movie.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <vector>
+
+extern char** environ;
+
+namespace kuzure::report {
+
+namespace {
+/// Exit code of ffmpeg; throws where there is no such program.
+int ffmpeg(std::vector<std::string> words)
+{
+    std::vector<char*> argv;
+    for (auto& w : words) argv.push_back(w.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t files;
+    posix_spawn_file_actions_init(&files);
+    for (const int fd : {0, 1, 2}) posix_spawn_file_actions_addopen(&files, fd, "/dev/null", fd == 0 ? O_RDONLY : O_WRONLY, 0);
+    pid_t child = 0;
+    const int error = posix_spawnp(&child, "ffmpeg", &files, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&files);
+    if (error == ENOENT)
+        throw IoFailed(
+            "no film: ffmpeg is not installed. Remedy: apt-get install ffmpeg, then kuzure report --movie; the pictures are there");
+    if (error != 0) throw IoFailed(fmt::format("no film: ffmpeg could not be started ({})", std::strerror(error)));
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+/// A path as a pattern that only it fits.
+std::string literal(const io::Path& path)
+{
+    std::string out;
+    for (const char c : path.string()) {
+        if (std::strchr("*?[]{}~\\", c)) out += '\\';
+        out += c;
+    }
+    return out;
+}
+} // namespace
+
+io::Path write_movie(const io::Path& where)
+{
+    const io::Path directory = std::filesystem::absolute(where);
+    int pictures = 0;
+    for (const auto& e : std::filesystem::directory_iterator(directory)) {
+        const auto name = e.path().filename().string();
+        pictures += name.starts_with("picture_") && name.ends_with(".png");
+    }
+    if (pictures < 2)
+        throw IoFailed(fmt::format("{}: a film needs two pictures or more, found {}. Remedy: [output] picture and a shorter every",
+                                   directory.string(), pictures));
+    const std::string rate = std::to_string(std::clamp(pictures / 10, 4, 25));
+    const std::vector<std::pair<const char*, std::vector<std::string>>> ways{
+        {"movie.mp4", {"-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"}},
+        {"movie.webm", {"-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0"}},
+        {"movie.gif", {"-vf", "scale=960:-1"}},
+    };
+    for (const auto& [name, coding] : ways) {
+        const std::string part = std::string("part_") + name;
+        std::vector<std::string> words{
+            "ffmpeg", "-y", "-nostdin", "-framerate", rate, "-pattern_type", "glob", "-i", literal(directory) + "/picture_*.png"};
+        words.insert(words.end(), coding.begin(), coding.end());
+        words.push_back((directory / part).string());
+        const int code = ffmpeg(words);
+        std::error_code ignored;
+        if (code == 0) {
+            for (const auto& way : ways) std::filesystem::remove(directory / way.first, ignored);
+            std::filesystem::rename(directory / part, directory / name);
+            return where / name;
+        }
+        std::filesystem::remove(directory / part, ignored);
+    }
+    throw IoFailed(
+        fmt::format("{}: ffmpeg could make no film of the pictures. Remedy: try it by hand, ffmpeg -framerate {} -pattern_type glob "
+                    "-i 'picture_*.png' movie.mp4",
+                    directory.string(), rate));
+}
+
+} // namespace kuzure::report

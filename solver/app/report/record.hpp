@@ -1,0 +1,34 @@
+#pragma once
+// What a run left in its directory, as far as it can be read.
+#include "io/file.hpp"
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace kuzure::report {
+
+/// Columns of a table of rows by name; cells that are no numbers are NaN.
+using Table = std::map<std::string, std::vector<double>>;
+
+struct Record {
+    io::Path directory;
+    nlohmann::json summary = nlohmann::json::object(), timers = nlohmann::json::object(); // empty where missing or damaged
+    Table history, progress;
+    std::vector<io::Path> pictures; // in order of time
+    std::vector<double> picture_times;
+    io::Path movie;                 // empty: none
+    std::string scene, title;       // text of scene.toml
+    std::optional<double> end_time; // s, of the scene
+    bool flat = false;              // 2-D
+    std::vector<std::string> gaps;  // what could not be read, in sentences
+
+    double number(const char* key) const; // of the summary; NaN where absent
+    std::string text(const char* key) const;
+};
+
+/// Throws BadInput where there is neither a scene nor a summary of a run; whatever else is missing or damaged is a gap.
+Record read_record(const io::Path& directory);
+
+} // namespace kuzure::report

@@ -1,0 +1,90 @@
+#include "solver/app/status.hpp"
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <string_view>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace kuzure {
+
+namespace {
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+std::string duration(double seconds)
+{
+    const auto s = std::llround(seconds);
+    if (s < 100) return fmt::format("{} s", s);
+    if (s < 6000) return fmt::format("{} min", (s + 30) / 60);
+    if (s < 172800) return fmt::format("{} h {:02} min", s / 3600, s % 3600 / 60);
+    return fmt::format("{} d {} h", s / 86400, s % 86400 / 3600);
+}
+
+/// mpirun's ranks always write to a pseudo-terminal; who sends that into a file says TERM=dumb.
+bool terminal()
+{
+    const char* kind = std::getenv("TERM");
+    return isatty(STDOUT_FILENO) != 0 && kind && std::string_view(kind) != "dumb";
+}
+} // namespace
+
+StatusLine::StatusLine(bool speaks, double end, double begin, std::int64_t step)
+    : speaks_(speaks), bar_(terminal()), end_(end), start_(now()), last_(start_), time_(begin), step_(step)
+{
+}
+
+bool StatusLine::due(bool final) const
+{
+    if (!speaks_) return false;
+    const double t = now();
+    // A log of a long run stays short: every ten seconds at first, every fiftieth of the time gone by later.
+    return final || t - last_ >= (bar_ ? 0.5 : std::max(10.0, (t - start_) / 50));
+}
+
+std::string StatusLine::text(const Status& s, double end, double rate, double left)
+{
+    std::string out = fmt::format("t {:.4f}/{:g} s  step {}  dt {:.2e}  {:.3g} steps/s", s.time, end, s.step, s.dt, rate);
+    if (left >= 0) {
+        const std::time_t at = std::time(nullptr) + std::llround(left);
+        out += fmt::format("  {} left, ends {:%H:%M}", duration(left), fmt::localtime(at));
+    }
+    if (s.residual) out += fmt::format("  energy {:+.3f} %", 100 * *s.residual);
+    if (s.heap) {
+        out += fmt::format("  front x {:.2f}..{:.2f}", s.heap->min_x, s.heap->max_x);
+        if (s.dimensions == 3) out += fmt::format(" y {:.2f}..{:.2f}", s.heap->min_y, s.heap->max_y);
+        out += " m";
+    }
+    out += fmt::format("  max {:.2f} m/s", s.max_speed);
+    if (s.ranks > 1) out += fmt::format("  balance {:.2f}", s.imbalance);
+    return out;
+}
+
+void StatusLine::show(const Status& s, bool final)
+{
+    const double t = now(), passed = std::max(t - last_, 1e-6);
+    // The recent pace, remembered for about half a minute.
+    const double weight = rate_ > 0 ? 1 - std::exp(-passed / 30) : 1;
+    rate_ += weight * (double(s.step - step_) / passed - rate_);
+    pace_ += weight * ((s.time - time_) / passed - pace_);
+    const double rate = rate_, left = final || pace_ <= 0 ? -1 : (end_ - s.time) / pace_;
+    last_ = t, time_ = s.time, step_ = s.step;
+    const double done = std::clamp(s.time / end_, 0.0, 1.0);
+    std::string line = text(s, end_, rate, left);
+    if (!bar_) fmt::print("{:3.0f} %  {}\n", 100 * done, line);
+    else {
+        winsize size{};
+        const int columns = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+        const int width = columns >= 140 ? 20 : 10, full = int(done * width);
+        // Longer than the terminal is wide, it could not renew itself.
+        line.resize(std::min(line.size(), std::size_t(std::max(0, columns - width - 4))));
+        fmt::print("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'), line,
+                   final ? "\n" : "");
+    }
+    std::fflush(stdout);
+}
+
+} // namespace kuzure

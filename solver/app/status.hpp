@@ -1,0 +1,40 @@
+#pragma once
+// What a run says while it goes: one line that renews itself on a terminal, plain lines ever further apart in a log.
+#include "solver/app/measure.hpp"
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace kuzure {
+
+/// Where a run stands. What comes from the last row of the history is absent before there is one.
+struct Status {
+    double time = 0; // s
+    std::int64_t step = 0;
+    double dt = 0, max_speed = 0;   // s, m/s
+    std::optional<double> residual; // 1
+    std::optional<Heap> heap;
+    int dimensions = 3, ranks = 1;
+    double imbalance = 1; // busiest rank over the mean
+};
+
+class StatusLine {
+public:
+    /// end, begin: simulated times, s; step: that of begin.
+    StatusLine(bool speaks, double end, double begin, std::int64_t step);
+    /// True if something should be shown now. `final`: whatever the clock says.
+    bool due(bool final) const;
+    void show(const Status&, bool final);
+
+    /// The words alone; rate in steps/s, left in s of wall time (negative: unknown).
+    static std::string text(const Status&, double end, double rate, double left);
+
+private:
+    bool speaks_, bar_;
+    double end_, start_, last_; // s; wall clock
+    double time_;               // s, simulated, when last shown
+    std::int64_t step_;
+    double rate_ = 0, pace_ = 0; // steps/s, simulated s a wall s: of late
+};
+
+} // namespace kuzure
