@@ -599,7 +599,7 @@ void Simulation::rebuild(bool sort_anew)
     });
     // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its place and record.
     const auto entries = double(lists_.entries() + lists_.wall_entries());
-    timers_.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + row_bytes()));
+    timers_.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + row_bytes(*model_)));
     if (sort_anew) clock_.extremes.moved2 = 0;
     pruned_margin_ = 0;
     built_ = true;
