@@ -121,6 +121,8 @@ CASES = {
     "periodic_unknown": ([("h = 1.2", "h = 1.2\nperiodic = [\"w\"]")], r'space\.periodic: .*found "w"'),
     "artificial_stress_unknown": ([("[accuracy]", "artificial_stress = \"on\"\n[accuracy]")], r'effects\.artificial_stress: expected "auto" or a table, found "on"'),
     "picture_unknown": ([("[output]", "[output]\npicture = { view = \"front\" }")], r'output\.picture\.view: expected one of "oblique"'),
+    "picture_range_backwards": (out("picture = { range = [2.0, 1.0] }"), r'output\.picture\.range: expected \[least, largest\], found \[2, 1\]; exchange'),
+    "movie_without_picture": (out("movie = true"), r'output\.movie: a film is made of pictures, and there are none'),
     "body_soil_unknown": ([("soil = \"sand\"", "soil = \"sandy\"")], r':15: body\.0\.soil: expected the name of a soil, found "sandy"; did you mean "sand"'),
     # rules
     "no_strength": ([("friction_angle = 25.0", "")], r':9: soil\.sand: expected a soil with strength'),
