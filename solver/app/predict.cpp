@@ -27,7 +27,7 @@ constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 constexpr double drift = 5e-5;           // growth of max/mean - 1 per step while soil slides
 constexpr double cut_seconds = 2.8e-6;   // METIS per block and halving of the parts, here
-constexpr double evening_seconds = 4e-6; // evening out and telling all ranks, per block, here
+constexpr double evening_seconds = 1e-5; // a re-cut on rank 0, per block: graph, evening out, looking at it twice; 216,000 blocks here
 constexpr double block_bytes = 48;       // of a block, its cost and its owner
 constexpr double scalar_ns_here = 59;    // particle_ns of the machine where the one above was measured
 
