@@ -22,7 +22,7 @@ struct WorkDone {
     std::int64_t particle_steps = 0; // soil particles owned, summed over the steps
     std::int64_t pairs = 0;
     std::int64_t halo_bytes = 0, messages = 0; // sent to other ranks, once a step
-    RankStep first_step;                       // of these timers; of one rank, so without meaning in a sum
+    RankStep first_step{};                     // of these timers; of one rank, so without meaning in a sum
 };
 
 /// One phase over all ranks.

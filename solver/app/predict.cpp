@@ -27,9 +27,9 @@ constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 constexpr double drift = 5e-5;           // growth of max/mean - 1 per step while soil slides
 constexpr double cut_seconds = 2.8e-6;   // METIS per block and halving of the parts, here
-constexpr double evening_seconds = 4e-6; // evening out and telling all ranks, per block, here
+constexpr double evening_seconds = 1e-5; // a re-cut on rank 0, per block: graph, evening out, looking at it twice; 216,000 blocks here
 constexpr double block_bytes = 48;       // of a block, its cost and its owner
-constexpr double scalar_ns_here = 59;    // particle_ns of the machine where the two above were measured
+constexpr double scalar_ns_here = 59;    // particle_ns of the machine where the one above was measured
 
 } // namespace
 
@@ -70,8 +70,7 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
                 steps_per_rebuild;
     // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
     // sqrt(2 C/(d t)) steps, and cut and idle time together cost 2 C of them.
-    const double per_block = at.blocks > large_graph ? evening_seconds : cut_seconds * levels;
-    const double cut = at.blocks * (per_block * c.particle_ns / scalar_ns_here + 2 * block_bytes / bandwidth);
+    const double cut = at.blocks * (evening_seconds * c.particle_ns / scalar_ns_here + 2 * block_bytes / bandwidth);
     if (cut > 0) {
         s.recut_steps = std::sqrt(2 * cut / (drift * s.total()));
         s.recut = 2 * cut / s.recut_steps;

@@ -69,7 +69,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
         domain_.migrate(particles_);
         if (clock_.step > 0) rebuild(false);
         if (again) {
-            report = domain_.cut(block_work(), Method::Metis, halo);
+            report = domain_.cut(block_work(), Method::Metis, halo, Labels::Free);
             domain_.migrate(particles_);
             rebuild(false);
         }

@@ -130,8 +130,8 @@ try:
     check(slow["latency_doubled"] > many[64]["predicted_seconds_per_step"] <= slow["bandwidth_halved"], "worse networks take longer")
     check(abs(sum(many[64]["predicted_step"].values()) / many[64]["predicted_seconds_per_step"] - 1) < 1e-9, "parts of the step add up to it")
 
-    # A later state: 400 steps on 3 ranks, then counted and run for 4. Lists of a restart are those of the last sort, a few
-    # particles of which have moved on: nearly, not exactly.
+    # A later state: 400 steps on 3 ranks, then counted and run for 4. The run's ghosts are those of the last sort, from which
+    # particles have moved on since: nearly as many, not exactly.
     later = ("--set", "time.end=0.04", "--set", "body.0.velocity=[1.0, 0.0, 0.0]")
     run(files["cube"], 3, "later", *later)
     state = os.path.join(work, "later")
@@ -142,7 +142,7 @@ try:
         did = json.load(f)["first_step"]
     for key in ("soil", "pairs", "ghosts"):
         a, b = sum(r[key] for r in did), sum(r[key] for r in counted(case))
-        check(abs(a - b) <= 0.03 * b, f"after a restart on 4 ranks: {a} {key}, counted {b}")
+        check(abs(a - b) <= (0.08 if key == "ghosts" else 0) * b, f"after a restart on 4 ranks: {a} {key}, counted {b}")
     check(max(r["pairs"] for r in did) * 4 <= 1.06 * sum(r["pairs"] for r in did), "a restart shares pairs evenly")
 
     # What cannot be

@@ -28,7 +28,8 @@ TEST(Predict, OneRankOnlyComputes)
 TEST(Predict, TwoRanksOfTwoNodesByHand)
 {
     const auto m = plain();
-    RankLoad r{.pairs = 1e6, .particles = 2e4, .rim = 2000, .rows = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_rows = 1000};
+    RankLoad r{
+        .pairs = 1e6, .particles = 2e4, .rim = 2000, .rows = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_rows = 1000};
     const std::vector<RankLoad> even{r, r};
     StepPlace at{.machine = m, .ranks = 2, .ranks_per_node = 1, .row_bytes = 100};
     auto s = predict_step(even, at);
@@ -50,7 +51,7 @@ TEST(Predict, TwoRanksOfTwoNodesByHand)
     // The slowest counts.
     RankLoad slow = even[0];
     slow.pairs *= 1.2;
-    at = {.machine = m, .ranks = 2, .ranks_per_node = 1, .row_bytes = 100};
+    at.bandwidth_times = at.latency_times = 1;
     s = predict_step(std::vector{even[0], slow}, at);
     EXPECT_NEAR(s.imbalance, 0.1 * 2.5e-3, 1e-12);
 }
