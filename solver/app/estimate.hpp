@@ -18,10 +18,10 @@ struct Estimate {
     double snapshots;  // how many
     double history;    // bytes
     double history_rows;
-    double pairs;      // directed pairs of all steps
-    double record;     // bytes of a ghost particle, sent every step
-    double support;    // radius in which particles see each other, spacings
-    bool mixed;        // precision of the pair sums
+    double pairs;   // directed pairs of all steps
+    double record;  // bytes of a ghost particle, sent every step
+    double support; // radius in which particles see each other, spacings
+    bool mixed;     // precision of the pair sums
 
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
     double disk() const { return snapshots * snapshot + 3 * checkpoint + history; }
