@@ -73,7 +73,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
             domain_.migrate(particles_);
             rebuild(false);
         }
-        rebalance_ = Rebalance(report.imbalance, omp_get_wtime() - begin);
+        rebalance_ = Rebalance(report.imbalance, comm_.max(omp_get_wtime() - begin));
     });
 }
 
