@@ -84,6 +84,7 @@ private:
     }
     static std::string as_toml(const toml::node& node)
     {
+        if (const auto* x = node.as_floating_point()) return fmt::format("{}", x->get()); // 0.1, not 0.10000000000000001
         std::ostringstream out;
         node.visit([&](const auto& n) { out << n; });
         return out.str();
@@ -112,10 +113,9 @@ private:
         }
     }
 
-    void read_reference(Sweep& s) const
+    /// Without one it is the finest run.
+    void read_reference_kind(Sweep& s, const toml::node* node) const
     {
-        const auto* node = root_.get("reference");
-        if (!node) return; // the finest run
         const auto& t = table(*node, "reference");
         known(t, "reference.", {"finest", "closed_form", "profile", "failure", "scatter"});
         const int kinds = int(t.contains("finest")) + int(t.contains("closed_form")) + int(t.contains("profile"));
@@ -136,12 +136,18 @@ private:
             if (const auto* f = t.get("failure")) s.reference.failure = file(text(*f, "reference.failure"));
             if (const auto* f = t.get("scatter")) s.reference.scatter = number(*f, "reference.scatter", 0, 1, "0.05");
         }
+    }
+    void read_reference(Sweep& s) const
+    {
+        const auto* node = root_.get("reference");
+        if (node) read_reference_kind(s, node);
         const auto needs = [&](Measure m, bool met, const char* what) {
             if (!met && std::find(s.measures.begin(), s.measures.end(), m) != s.measures.end())
                 refuse(node, "reference",
                        fmt::format("the measure \"{}\" needs {}; add it or leave the measure out", measure_names()[std::size_t(m)], what));
         };
         const bool closed = s.reference.kind == SweepReference::Kind::ClosedForm;
+        needs(Measure::Stress, closed, "closed_form = \"k0 column\"");
         needs(Measure::Settlement, closed, "closed_form = \"k0 column\"");
         needs(Measure::FailureLine, !s.reference.failure.empty() || s.reference.kind == SweepReference::Kind::Finest,
               "failure = \"FILE.csv\"");

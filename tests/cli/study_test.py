@@ -113,7 +113,10 @@ class Study(unittest.TestCase):
     def test_figures_and_what_is_said_without_gnuplot(self):
         bare = self.dir / "bin"
         bare.mkdir()
-        os.symlink(shutil.which("sh"), bare / "sh")
+        for folder in os.environ["PATH"].split(":"):  # all but gnuplot: MPI starts programs of its own
+            for file in Path(folder).glob("*"):
+                if not file.name.startswith("gnuplot") and not (bare / file.name).is_symlink():
+                    (bare / file.name).symlink_to(file)
         done = self.study(PATH=str(bare))
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("gnuplot is not installed", done.stdout)
