@@ -1,4 +1,5 @@
 #include "io/sweep_file.hpp"
+#include "io/document.hpp"
 #include "io/scene_keys.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -6,8 +7,6 @@
 #include <functional>
 #include <map>
 #include <sstream>
-#define TOML_ASSERT(expression) static_assert(true) // as in io/scene_file.cpp
-#include <toml++/toml.h>
 
 namespace kuzure::io {
 namespace {
@@ -22,12 +21,7 @@ class SweepReader {
 public:
     SweepReader(std::string_view text, const Path& name) : name_(name.string()), folder_(name.parent_path())
     {
-        try {
-            root_ = toml::parse(text);
-        } catch (const toml::parse_error& e) {
-            throw BadInput(fmt::format("{}:{}: expected TOML, found an error in column {}: {}; correct this line", name_,
-                                       e.source().begin.line, e.source().begin.column, e.description()));
-        }
+        root_ = Document(text, name_, scene_keys()).root;
     }
 
     Sweep read()
@@ -174,7 +168,7 @@ private:
     }
     void require_key(const toml::node& node, const std::string& path, const std::string& where) const
     {
-        if (find_key(path)) return;
+        if (scene_keys().find(path)) return;
         std::vector<std::string> all;
         for (const Key& k : scene_keys()) all.push_back(k.path);
         refuse(&node, where + path, fmt::format("expected a key of a scene, found \"{}\"; did you mean \"{}\"?", path, nearest(path, all)));

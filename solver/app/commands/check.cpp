@@ -54,7 +54,8 @@ void add_check(CLI::App& app, Action& chosen)
     auto accuracy = std::make_shared<std::string>();
     args->add_to(*command);
     command->add_flag("--json", *json, "as JSON");
-    command->add_option("--accuracy", *accuracy, "settings for this error, such as 5%, from the measured table, with time and expected error")
+    command
+        ->add_option("--accuracy", *accuracy, "settings for this error, such as 5%, from the measured table, with time and expected error")
         ->type_name("ERROR");
     auto* profile =
         command->add_option("--machine", *machine, "predict for a profile of jobs/machines, or the path of one")->type_name("NAME");

@@ -1,5 +1,5 @@
 #include "solver/app/study/heap.hpp"
-#include "io/history.hpp"
+#include "solver/app/report/record.hpp"
 #include "solver/scene/material.hpp"
 #include <algorithm>
 #include <cmath>
@@ -193,7 +193,7 @@ AtRest measure_at_rest(const Scene& s, const io::SoilSnapshot& soil)
 
 double greatest_speed(const io::Path& run, double of_steps)
 {
-    const auto history = io::read_history(run / "history.csv");
+    const auto history = report::read_table(io::read_text(run / "history.csv"));
     const auto column = history.find("max_speed");
     if (column != history.end())
         for (const double v : column->second) of_steps = std::max(of_steps, v);

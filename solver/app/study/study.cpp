@@ -1,7 +1,7 @@
 #include "solver/app/study/study.hpp"
-#include "io/history.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/estimate.hpp"
+#include "solver/app/report/record.hpp"
 #include "solver/scene/numbers.hpp"
 #include <algorithm>
 #include <charconv>
@@ -168,7 +168,7 @@ void measure(const Study& study, Point& p, const io::Path& run)
     const auto summary = nlohmann::json::parse(io::read_text(run / "summary.json"));
     p.particles = summary.at("soil_particles"), p.steps = summary.at("steps");
     p.pairs = summary.at("pairs").get<double>(), p.wall_seconds = summary.at("wall_seconds");
-    const auto history = io::read_history(run / "history.csv");
+    const auto history = report::read_table(io::read_text(run / "history.csv"));
     const auto soil = io::read_snapshot(io::last_snapshot(run));
     p.profile = measure_profile(*p.scene, soil, study.window);
     const auto wants = [&](Measure m) {
