@@ -26,6 +26,21 @@ void one_shape(Document& file, const toml::table& table, const std::string& path
                                                        : "give every shape its own table"));
 }
 
+/// Writes what the scene's preset sets, and the scene does not, into the document. What is wrong is left to check_table().
+void apply_preset(toml::table& root)
+{
+    const auto name = root["accuracy"]["preset"].value<std::string>();
+    for (const Preset& preset : presets()) {
+        if (!name || preset.name != *name) continue;
+        for (const auto& [path, value] : preset.settings) {
+            const auto dot = path.find('.');
+            auto* table = root[path.substr(0, dot)].as_table();
+            const auto leaf = path.substr(dot + 1);
+            if (table && !table->contains(leaf)) table->insert(leaf, *toml::parse("v = " + value).get("v"));
+        }
+    }
+}
+
 // ---- one description of the scene for reading, writing and hashing ----
 
 template <class A> void describe_shape(A& a, const std::string& path, scene::Shape& shape)
@@ -121,6 +136,7 @@ template <class A> void describe(A& a, Scene& s)
     });
 
     a.section("accuracy");
+    a.choice("accuracy.preset", s.accuracy.preset);
     a.choice("accuracy.kernel", s.accuracy.kernel);
     a.number("accuracy.cfl", s.accuracy.cfl);
     a.choice("accuracy.precision", s.accuracy.precision);
@@ -417,6 +433,7 @@ std::string read_scene_text(const std::filesystem::path& path) { return read_doc
 Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
 {
     Document file(text, name, scene_keys(), sets);
+    apply_preset(file.root);
     file.check(one_shape);
 
     Scene scene;

@@ -1,5 +1,6 @@
 #include "io/scene_keys.hpp"
 #include <algorithm>
+#include <fmt/format.h>
 
 namespace kuzure::io {
 namespace {
@@ -13,6 +14,34 @@ const Range any{};
 /// Places and sizes: beyond this nobody means metres.
 const double far = 1e9;
 
+/// In the order of scene::Preset.
+std::vector<Preset> make_presets()
+{
+    const auto preset = [](const char* name, const char* doc, const char* kernel, const char* h, const char* cfl, const char* precision,
+                           const char* correction) {
+        const auto quoted = [](const char* s) { return fmt::format("\"{}\"", s); };
+        return Preset{name,
+                      doc,
+                      {{"space.h", h},
+                       {"accuracy.kernel", quoted(kernel)},
+                       {"accuracy.cfl", cfl},
+                       {"accuracy.precision", quoted(precision)},
+                       {"accuracy.correction", quoted(correction)},
+                       {"accuracy.skin", "0.1"}}};
+    };
+    return {
+        preset("seed", "as the paper: its step of 1e-4 s is a Courant number of 0.075", "cubic spline", "1.2", "0.075", "double", "none"),
+        preset("fast", "least time for a first look", "cubic spline", "1.2", "0.3", "mixed", "none"),
+        preset("standard", "least error for its time", "wendland c2", "1.3", "0.2", "double", "none"),
+        preset("accurate", "least error at a spacing", "wendland c2", "1.5", "0.2", "double", "none")};
+}
+std::vector<std::string> preset_names()
+{
+    std::vector<std::string> names;
+    for (const auto& p : presets()) names.push_back(p.name);
+    return names;
+}
+
 std::vector<Key> make_keys()
 {
     using enum Kind;
@@ -25,7 +54,7 @@ std::vector<Key> make_keys()
 
         {"space", Table, "", Required, "", any, {}, "{ spacing = 0.04 }", "resolution and extent"},
         {"space.spacing", Number, "m", Required, "", between(1e-6, 1e6), {}, "0.04", "initial distance of particles"},
-        {"space.h", Number, "spacings", Default, "1.3", between(0.8, 3), {}, "1.3", "smoothing length; the support is 2 h"},
+        {"space.h", Number, "spacings", Default, "", between(0.8, 3), {}, "1.3", "smoothing length; the support is 2 h"},
         {"space.low", Vector, "m", Optional, "", place, {}, "[-1.0, -1.0, -0.5]", "lower corner of the box that particles may not leave"},
         {"space.high", Vector, "m", Optional, "", place, {}, "[10.0, 10.0, 5.0]", "upper corner of the box that particles may not leave"},
         {"space.periodic", Choices, "", Optional, "", any, {"x", "y", "z"}, "[\"y\"]", "axes along which space repeats from low to high"},
@@ -240,17 +269,17 @@ std::vector<Key> make_keys()
          Choice,
          "",
          Default,
-         "\"wendland c2\"",
+         "",
          any,
          {"cubic spline", "wendland c2", "wendland c4"},
          "\"wendland c2\"",
          "smoothing kernel"},
-        {"accuracy.cfl", Number, "1", Default, "0.2", above(0), {}, "0.2", "Courant number of the step where time.step is absent"},
+        {"accuracy.cfl", Number, "1", Default, "", above(0), {}, "0.2", "Courant number of the step where time.step is absent"},
         {"accuracy.precision",
          Choice,
          "",
          Default,
-         "\"double\"",
+         "",
          any,
          {"double", "mixed"},
          "\"double\"",
@@ -259,7 +288,7 @@ std::vector<Key> make_keys()
          Choice,
          "",
          Default,
-         "\"none\"",
+         "",
          any,
          {"none", "gradient"},
          "\"none\"",
@@ -268,7 +297,7 @@ std::vector<Key> make_keys()
          Number,
          "supports",
          Default,
-         "0.1",
+         "",
          between(0.01, 0.5),
          {},
          "0.1",
@@ -406,10 +435,21 @@ std::vector<Key> make_keys()
         for (auto& row : rows) row.path = parent + row.path;
         keys.insert(at, rows.begin(), rows.end());
     }
+    // The defaults of what a preset sets are written once, there.
+    for (const auto& preset : presets())
+        if (preset.name == default_preset)
+            for (const auto& [path, value] : preset.settings)
+                std::find_if(keys.begin(), keys.end(), [&, &path = path](const Key& k) { return k.path == path; })->fallback = value;
     return keys;
 }
 
 } // namespace
+
+const std::vector<Preset>& presets()
+{
+    static const std::vector<Preset> all = make_presets();
+    return all;
+}
 
 const KeyTable& scene_keys()
 {

@@ -22,6 +22,12 @@ bool wanted(const std::vector<std::string>& fields, std::string_view name)
     return fields.empty() || std::find(fields.begin(), fields.end(), name) != fields.end();
 }
 
+/// state_000000.hdf and its like.
+bool is_snapshot(std::string_view name)
+{
+    return name.size() == 16 && name.starts_with("state_") && name.ends_with(".hdf") && name.find_first_not_of("0123456789", 6) == 12;
+}
+
 /// Rows of this rank as they go to the file: its soil, then its walls.
 class Rows {
 public:
@@ -167,6 +173,39 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
     out.publish();
 }
 
+SoilSnapshot read_snapshot(const Path& file)
+{
+    const H5Reader in(file);
+    const std::string top = "/VTKHDF", data = top + "/PointData/";
+    const auto rows = in.table(top + "/Points").rows;
+    SoilSnapshot s;
+    s.time = in.real(top, "time");
+    std::vector<std::int32_t> kind;
+    in.rows(data + "kind", 0, rows, 1, kind);
+    std::vector<double> values;
+    const auto soil = [&](const std::string& name, int components, auto put) {
+        in.rows(name, 0, rows, components, values);
+        for (std::size_t i = 0; i < rows; ++i)
+            if (kind[i] == 0) put(values.data() + i * std::size_t(components));
+    };
+    const auto vector = [](std::vector<Vector>& to) { return [&to](const double* v) { to.push_back({v[0], v[1], v[2]}); }; };
+    soil(top + "/Points", 3, vector(s.position));
+    if (in.has(data + "displacement")) soil(data + "displacement", 3, vector(s.displacement));
+    if (in.has(data + "stress"))
+        soil(data + "stress", 6, [&](const double* v) { s.stress.push_back({v[0], v[1], v[2], v[3], v[4], v[5]}); });
+    return s;
+}
+
+Path last_snapshot(const Path& results)
+{
+    Path last;
+    std::error_code error;
+    for (const auto& e : std::filesystem::directory_iterator(results / "snapshots", error))
+        if (is_snapshot(e.path().filename().string()) && last.filename() < e.path().filename()) last = e.path();
+    if (last.empty()) throw IoFailed(fmt::format("{}: no snapshot is there: run the scene again", (results / "snapshots").string()));
+    return last;
+}
+
 // ---- series
 // ----------------------------------------------------------------------------------------------------------
 Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<double> restart_time) : team_(team), directory_(directory)
@@ -178,8 +217,7 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
         std::vector<std::string> names;
         for (const auto& e : fs::directory_iterator(directory)) {
             const std::string name = e.path().filename().string();
-            if (name.size() == 16 && name.starts_with("state_") && name.ends_with(".hdf") && name.find_first_not_of("0123456789", 6) == 12)
-                names.push_back(name);
+            if (is_snapshot(name)) names.push_back(name);
         }
         std::sort(names.begin(), names.end());
         // The files are the truth: they know their times also where the series was lost.

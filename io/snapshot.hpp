@@ -5,6 +5,7 @@
 #include "io/wall_points.hpp"
 #include "solver/core/particles.hpp"
 #include <optional>
+#include <vector>
 
 namespace kuzure::io {
 
@@ -26,6 +27,17 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
 /// origin columns where those fields are asked for; a plastic strain nobody carries is written as zero.
 /// Throws BadInput for an unknown field, IoFailed.
 void write_snapshot(const Team&, const Path& file, const Particles&, const WallPoints&, const SnapshotLabel&);
+
+/// The soil of a snapshot, in the file's order.
+struct SoilSnapshot {
+    double time = 0;                            // s
+    std::vector<Vector> position, displacement; // m; displacement only where the file has it
+    std::vector<Stress> stress;                 // Pa; only where the file has it
+};
+/// Reads a snapshot that kuzure wrote, on this rank alone. Throws IoFailed.
+SoilSnapshot read_snapshot(const Path& file);
+/// The newest snapshot of a result directory. Throws IoFailed where there is none.
+Path last_snapshot(const Path& results);
 
 /// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series.
 class Snapshots {

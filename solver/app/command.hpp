@@ -40,6 +40,7 @@ void add_reference(CLI::App&, Action& chosen);
 void add_scale(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
+void add_study(CLI::App&, Action& chosen);
 
 /// "0.1.0", and a text with git hash, compiler, instruction set and packages.
 std::string version();

@@ -18,6 +18,7 @@ int main(int argc, char** argv)
     add_check(app, chosen);
     add_report(app, chosen);
     add_job(app, chosen);
+    add_study(app, chosen);
     add_reference(app, chosen);
     add_scale(app, chosen);
 #if defined(KUZURE_TRAP_FPE)

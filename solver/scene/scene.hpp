@@ -5,7 +5,10 @@
 namespace kuzure::scene {
 
 // ---- accuracy, output ----
+/// Which named set of accuracy keys a scene started from; the keys themselves decide.
+enum class Preset { Seed, Fast, Standard, Accurate };
 struct Accuracy {
+    Preset preset = Preset::Standard;
     Kernel kernel = Kernel::WendlandC2;
     double cfl = 0.2;
     Precision precision = Precision::Double;

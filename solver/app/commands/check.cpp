@@ -4,6 +4,7 @@
 #include "solver/app/command.hpp"
 #include "solver/app/forecast.hpp"
 #include "solver/app/predict.hpp"
+#include "solver/app/study/dial.hpp"
 #include "solver/kernels/step.hpp"
 #include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
@@ -13,6 +14,20 @@
 namespace kuzure {
 
 namespace {
+
+/// kuzure check --accuracy: settings from the measured table.
+Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy, bool json)
+{
+    const double wanted = study::parse_accuracy(accuracy);
+    use_threads(comm, 0);
+    const auto proposal = study::propose(s, wanted, study::measured(), [&](const Scene& proposed) {
+        const scene::Filling filling(proposed);
+        return forecast(comm, proposed, filling, estimate(proposed, filling, *choose_model(proposed, Arithmetic::Lanes))).seconds;
+    });
+    // Times were taken on every rank, so ranks may differ in what is cheapest: the root's choice is shown.
+    if (comm.rank() == 0) fmt::print("{}", json ? study::to_json(proposal, wanted).dump(2) + "\n" : study::to_text(proposal, wanted));
+    return Exit::Ok;
+}
 
 /// As JSON has whole numbers.
 std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
@@ -36,8 +51,12 @@ void add_check(CLI::App& app, Action& chosen)
     auto json = std::make_shared<bool>(false);
     auto machine = std::make_shared<std::string>();
     auto ranks = std::make_shared<int>(0);
+    auto accuracy = std::make_shared<std::string>();
     args->add_to(*command);
     command->add_flag("--json", *json, "as JSON");
+    command
+        ->add_option("--accuracy", *accuracy, "settings for this error, such as 5%, from the measured table, with time and expected error")
+        ->type_name("ERROR");
     auto* profile =
         command->add_option("--machine", *machine, "predict for a profile of jobs/machines, or the path of one")->type_name("NAME");
     command->add_option("--ranks", *ranks, "ranks on that machine (default: one node full)")
@@ -46,6 +65,7 @@ void add_check(CLI::App& app, Action& chosen)
     command->callback([=, &chosen] {
         chosen = [=](const Comm& comm) {
             const Scene s = args->read(comm);
+            if (!accuracy->empty()) return turn_the_dial(comm, s, *accuracy, *json);
             const scene::Filling filling(s);
             const auto model = choose_model(s, Arithmetic::Lanes);
             const Estimate e = estimate(s, filling, *model);

@@ -13,6 +13,7 @@
 #include "solver/app/report/report.hpp"
 #include "solver/app/simulation.hpp"
 #include "solver/app/status.hpp"
+#include "solver/app/study/twins.hpp"
 #include "solver/core/simd.hpp"
 #include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
@@ -34,6 +35,7 @@ struct Arguments {
     double max_minutes = 0;
     bool force = false, force_size = false, quiet = false, plain = false;
     int recut_every = 0;
+    bool twins = false;
 };
 
 volatile std::sig_atomic_t asked_to_stop = 0;
@@ -97,19 +99,58 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::
 
 class Run {
 public:
-    Run(const Comm& comm, const Arguments& a)
-        : comm_(comm), args_(a), start_(now()), threads_(use_threads(comm, a.threads)), scene_(a.scene.read(comm)),
-          hash_(io::scene_hash(scene_)), speaks_(comm.rank() == 0 && !a.quiet)
-    {
-    }
+    Run(const Comm& comm, const Arguments& a) : Run(comm, a, a.scene.read(comm)) {}
 
     Exit go()
     {
         open();
+        if (args_.twins) run_twins();
         return loop();
     }
 
 private:
+    Run(const Comm& comm, const Arguments& a, Scene scene, bool twin = false)
+        : comm_(comm), args_(a), twin_(twin), start_(now()), threads_(use_threads(comm, a.threads)), scene_(std::move(scene)),
+          hash_(io::scene_hash(scene_)), speaks_(comm.rank() == 0 && !a.quiet)
+    {
+    }
+
+    /// The coarser twins, before the run itself: what they leave becomes error bars at its end. A twin that fails costs its bar only.
+    void run_twins()
+    {
+        for (const int factor : study::twin_factors) {
+            study::TwinRun t;
+            t.twin.factor = factor;
+            t.directory = dir_->path() / "twins" / fmt::format("x{}", factor);
+            try {
+                t.twin = study::coarsened(scene_, factor);
+                bool there = false;
+                if (args_.restart) {
+                    std::error_code ignored;
+                    there = comm_.rank() == 0 && std::filesystem::exists(t.directory / "summary.json", ignored);
+                    if (there) {
+                        const auto j = nlohmann::json::parse(io::read_text(t.directory / "summary.json"), nullptr, false);
+                        there = j.is_object() && j.value("status", "") == "finished" &&
+                                j.value("scene_hash", "") == io::scene_hash(t.twin.scene);
+                    }
+                    there = comm_.max(std::int64_t(there)) > 0;
+                }
+                if (!there) {
+                    Arguments a = args_;
+                    a.output = t.directory.string(), a.twins = false, a.quiet = true, a.restart.reset(), a.force = true;
+                    say(fmt::format("twin of {} times the spacing, in {}", factor, t.directory.string()));
+                    Run(comm_, a, t.twin.scene, true).go();
+                }
+            } catch (const BadInput& e) {
+                t.failed = e.what();
+            } catch (const NumbersFailed& e) {
+                t.failed = e.what();
+            }
+            if (!t.failed.empty()) say(fmt::format("the twin of {} times the spacing failed: {}", factor, t.failed));
+            twins_.push_back(std::move(t));
+        }
+    }
+
     void say(const std::string& text) const
     {
         if (speaks_) fmt::print("{}\n", text), std::fflush(stdout);
@@ -118,7 +159,7 @@ private:
     void warn(const std::string& text)
     {
         warnings_.push_back(text);
-        if (comm_.rank() == 0) fmt::print(stderr, "kuzure: warning: {}\n", text);
+        if (comm_.rank() == 0 && !twin_) fmt::print(stderr, "kuzure: warning: {}\n", text);
     }
 
     void open()
@@ -289,6 +330,12 @@ private:
         const auto& seen = sim_->structure();
         j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
         j["retries"] = retries_;
+        j["peak_speed"] = peak_speed_;
+        if (args_.twins && code == Exit::Ok) {
+            io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, dir_->path(), peak_speed_, twins_); });
+            if (speaks_)
+                for (const auto& line : study::error_bar_lines(j["error_bars"])) say(line);
+        }
         io::write_json(comm_, dir_->summary(), j);
 
         auto report = phase_report(sim_->timers(), work, threads_, comm_);
@@ -387,6 +434,7 @@ private:
                 const double before = sim.time();
                 const Wishes w = advance();
                 loop_seconds_ = now() - begin;
+                peak_speed_ = std::max(peak_speed_, sim.max_speed());
                 outputs(before, sim.finished());
                 look(false);
                 if (w.stop && !sim.finished()) {
@@ -433,6 +481,7 @@ private:
 
     const Comm& comm_;
     Arguments args_;
+    bool twin_; // its warnings are those of the run it belongs to
     double start_;
     int threads_;
     Scene scene_;
@@ -453,6 +502,8 @@ private:
     bool stop_file_ = false;
     std::int64_t first_step_ = 0, logged_step_ = 0;
     std::vector<nlohmann::ordered_json> retries_;
+    double peak_speed_ = 0; // m/s, over the steps of this process
+    std::vector<study::TwinRun> twins_;
 };
 
 } // namespace
@@ -474,6 +525,7 @@ void add_run(CLI::App& app, Action& chosen)
     command->add_flag("--quiet", a->quiet, "print nothing but errors");
     command->add_flag("--force", a->force, "move an existing result directory aside");
     command->add_flag("--force-size", a->force_size, "start although memory or disk will not be enough by kuzure's estimate");
+    command->add_flag("--twins", a->twins, "first the same at 2 and 4 times the spacing: error bars on run-out, height and peak speed");
     command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");
     command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
     command->callback([=, &chosen] {

@@ -7,8 +7,6 @@
 
 namespace kuzure::report {
 
-namespace {
-
 Table read_table(const std::string& text)
 {
     Table t;
@@ -37,8 +35,6 @@ Table read_table(const std::string& text)
     }
     return t;
 }
-
-} // namespace
 
 double Record::number(const char* key) const
 {

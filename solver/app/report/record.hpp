@@ -11,6 +11,8 @@ namespace kuzure::report {
 
 /// Columns of a table of rows by name; cells that are no numbers are NaN.
 using Table = std::map<std::string, std::vector<double>>;
+/// The table of a text: a line of names, a line of units, rows. A torn last row is left out.
+Table read_table(const std::string& text);
 
 struct Record {
     io::Path directory;

@@ -83,6 +83,27 @@ std::string card(const char* name, const std::string& value, const std::string& 
                        more.empty() ? "" : "<small>" + escaped(more) + "</small>");
 }
 
+/// What the run's coarser twins say of its answer; nothing without them.
+std::string error_bars(const Record& r)
+{
+    if (!r.summary.contains("error_bars")) return {};
+    const auto& bars = r.summary["error_bars"];
+    std::string rows;
+    for (const char* name : {"run-out", "height", "peak speed"}) {
+        if (!bars.contains(name)) continue;
+        const auto& bar = bars[name];
+        const double value = at(bar, {"value"}), half_width = at(bar, {"half_width"});
+        const std::string unit = escaped(bar.value("unit", ""));
+        rows += fmt::format("<tr><td>{}</td><td>{}</td></tr>", name,
+                            std::isfinite(half_width)
+                                ? fmt::format("{:.4g} &plusmn; {:.2g} {}", value, half_width, unit)
+                                : fmt::format("{:.4g} {}; no interval: {}", value, unit, escaped(bar.value("no_interval", ""))));
+    }
+    return fmt::format(
+        "<p>From the same scene at 2 and 4 times the spacing; run-out where the heap is {:g} m high.</p>\n<table>{}</table>\n",
+        at(bars, {"grain"}), rows);
+}
+
 // ---- what happened -------------------------------------------------------------------------------------------------
 struct Verdict {
     const char* tone; // good, warn, bad
@@ -335,6 +356,7 @@ std::string html(const Record& r)
     s += section("pictures", "Pictures", pictures(r));
     s += section("energy", "Energy", energy(r));
     s += section("heap", "The heap", heap(r));
+    s += section("error-bars", "The answer and its error bars", error_bars(r));
     s += section("phases", "Where the time went", phases(r));
     s += section("roofline", "Against the machine", roofs(r));
     s += section("balance", "Speed and balance over time", balance(r));

@@ -1,0 +1,18 @@
+#pragma once
+// A child `kuzure run`: a point that fails does not end the study, and its processor time is the system's own count.
+#include "io/file.hpp"
+#include <string>
+#include <vector>
+
+namespace kuzure::study {
+
+struct ChildResult {
+    int exit_code = 0;       // of the program; 128 + signal if one ended it
+    double core_seconds = 0; // user and system time of all its threads
+    bool stopped = false;    // this program was asked to stop meanwhile
+};
+/// Runs this very program with other arguments, output into `log`, and waits. A SIGINT or SIGTERM that comes meanwhile is passed on
+/// to it. Throws IoFailed where it cannot be started.
+ChildResult run_child(const std::vector<std::string>& arguments, const io::Path& log);
+
+} // namespace kuzure::study
