@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Configure and build one preset of CMakePresets.json: jobs/build.sh PRESET [TARGET...]. Quiet unless it fails; the
-# output is in build/PRESET.log.
+# output is in build/PRESET.log. KUZURE_CMAKE: more options of cmake, such as -DKUZURE_FIRST_VARIANT=8.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source jobs/environment.sh
@@ -16,7 +16,7 @@ if [ -f "$cache" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$PWD" "$cache";
 # A compiler may take 1 GB: no more of them at once than memory carries.
 memory=$(awk '/^MemAvailable/ {print int($2 / 1048576)}' /proc/meminfo)
 jobs=$((memory < 1 ? 1 : memory < KUZURE_CORES ? memory : KUZURE_CORES))
-options=()
+read -ra options <<<"${KUZURE_CMAKE-}"
 if command -v ccache >/dev/null; then
     options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
     export CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1 # clones and work trees share what one of them compiled

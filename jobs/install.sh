@@ -11,7 +11,7 @@ libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlpl
     libpng-dev nlohmann-json3-dev libgtest-dev libgmock-dev libbenchmark-dev)
 scripts=(python3 python3-h5py python3-numpy)
 command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
-tests=(clang-format valgrind binutils)
+tests=(clang-format valgrind binutils dpkg-dev fakeroot)
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")

@@ -46,6 +46,27 @@ std::string version_text()
     return fmt::format("kuzure {} ({}), GCC {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, __VERSION__, instruction_set(), _OPENMP);
 }
 
+io::Path own_path()
+{
+    std::error_code error;
+    const io::Path self = std::filesystem::read_symlink("/proc/self/exe", error);
+    if (error) return "kuzure";
+    const io::Path group = self.parent_path().parent_path(); // <prefix>/lib/kuzure
+    const io::Path launcher = group.parent_path().parent_path() / "bin" / self.filename();
+    return group.filename() == "kuzure" && group.parent_path().filename() == "lib" && std::filesystem::exists(launcher, error) ? launcher
+                                                                                                                               : self;
+}
+
+void require_one_instruction_set(const Comm& comm)
+{
+    const std::string mine = instruction_set(), first = comm.broadcast(mine);
+    const auto different = comm.max(std::int64_t(mine != first));
+    if (different)
+        throw BadInput(fmt::format("the ranks run kuzure for different instruction sets, {} on rank 0: expected one, so that all ranks "
+                                   "give the same bits. Remedy: KUZURE_ISA=x86-64-v3 (or x86-64) on all nodes",
+                                   first));
+}
+
 int cores_here()
 {
     cpu_set_t cpus;

@@ -41,10 +41,17 @@ void add_scale(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
+void add_completion(CLI::App&, Action& chosen);
 
 /// "0.1.0", and a text with git hash, compiler, instruction set and packages.
 std::string version();
 std::string version_text();
+
+/// The path by which this program is started again: itself, or the launcher where it is one of several that a package
+/// installed under lib/kuzure. "kuzure" where the system does not say.
+io::Path own_path();
+/// Throws BadInput on all ranks where they were built for different instruction sets: their bits would differ. Collective.
+void require_one_instruction_set(const Comm&);
 
 /// The cores this process may use.
 int cores_here();

@@ -1,5 +1,6 @@
 // Arguments, MPI on and off, exit codes. What a command does stands in solver/app/commands.
 #include "solver/app/command.hpp"
+#include "solver/app/command_line.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #if defined(KUZURE_TRAP_FPE)
@@ -8,11 +9,28 @@
 
 using namespace kuzure;
 
+namespace {
+
+const char* const help_footer = R"(
+First steps:
+  kuzure check SCENE.toml                 what will be simulated, why, and how long it will take
+  kuzure run SCENE.toml -o DIR            simulate; a bar shows where it is
+  mpirun -n 4 kuzure run SCENE.toml       the same on four ranks, with the same bits
+  kuzure run SCENE.toml -o DIR --restart  go on from the newest good checkpoint
+  kuzure report DIR                       DIR/report.html: one page with everything
+  kuzure COMMAND --help                   the options of a command
+
+Exit codes: 0 done, 2 command line or scene wrong (nothing written), 3 the numbers failed,
+4 files failed, 5 stopped on request (a checkpoint was written))";
+
+}
+
 int main(int argc, char** argv)
 {
     CLI::App app{"kuzure: soil that collapses under its own weight"};
     app.set_version_flag("--version", version_text());
     app.require_subcommand(1);
+    fit_help_to_screen(app);
     Action chosen;
     add_run(app, chosen);
     add_check(app, chosen);
@@ -21,6 +39,8 @@ int main(int argc, char** argv)
     add_study(app, chosen);
     add_reference(app, chosen);
     add_scale(app, chosen);
+    add_completion(app, chosen);
+    app.footer(help_footer); // last: commands added after it would show it too
 #if defined(KUZURE_TRAP_FPE)
     feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
 #endif
@@ -42,6 +62,7 @@ int main(int argc, char** argv)
         return int(code);
     };
     try {
+        require_one_instruction_set(comm);
         return int(chosen(comm));
     } catch (const BadInput& e) {
         return fail(e.what(), Exit::BadInput);

@@ -7,10 +7,9 @@ namespace kuzure {
 
 io::MachineProfile machine_named(const std::string& name_or_path)
 {
-    std::vector<io::Path> folders{io::Path(KUZURE_SOURCE_DIR) / "jobs/machines"};
-    std::error_code error;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-    if (!error) folders.push_back(program.parent_path().parent_path() / "share/kuzure/machines");
+    // An installed program has its own beside it; one in the build tree takes the sources'.
+    const std::vector<io::Path> folders{own_path().parent_path().parent_path() / "share/kuzure/machines",
+                                        io::Path(KUZURE_SOURCE_DIR) / "jobs/machines"};
     auto m = io::read_machine_profile(name_or_path, folders);
     if (m.node.cores == 0) m.node.cores = cores_here();
     if (m.node.memory == 0) m.node.memory = machine_memory();

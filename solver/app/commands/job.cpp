@@ -1,5 +1,6 @@
 // kuzure job: a batch script for a machine of jobs/machines, to standard output.
 #include "solver/app/command.hpp"
+#include "solver/app/command_line.hpp"
 #include "solver/app/predict.hpp"
 #include "solver/kernels/step.hpp"
 #include <CLI/CLI.hpp>
@@ -163,9 +164,7 @@ Plan make_plan(const Comm& comm, const Arguments& a)
         p.margin = int(std::ceil(std::min(60 + e.checkpoint / writing + 2 * step, p.limit / 3.0)));
         p.jobs = int(std::min(1e6, std::ceil(whole / (p.limit - p.margin))));
     }
-    std::error_code error;
-    p.program = std::filesystem::read_symlink("/proc/self/exe", error);
-    if (error) p.program = "kuzure";
+    p.program = own_path();
     p.scene = std::filesystem::absolute(a.scene.file).lexically_normal();
     p.results = std::filesystem::absolute(a.scene.results(scene, a.output)).lexically_normal();
     p.name = job_name(p.scene);
@@ -334,6 +333,8 @@ void add_job(CLI::App& app, Action& chosen)
     command->add_option("--minutes", a->minutes, "clock limit of a job (default: from the predicted time)")->check(CLI::PositiveNumber);
     command->add_option("--ranks-per-node", a->ranks_per_node, "ranks on each node (default: the profile's)")->check(CLI::Range(1, 4096));
     command->add_option("-o,--output", a->output, "result directory (default: as kuzure run)")->type_name("DIR");
+    under_heading(*command, "What the job asks for",
+                  {"--machine", "--nodes", "--ranks-per-node", "--queue", "--mode", "--account", "--minutes"});
     command->callback([=, &chosen] {
         chosen = [=](const Comm& comm) {
             const Plan p = make_plan(comm, *a);

@@ -7,6 +7,8 @@
 #include "io/summary.hpp"
 #include "perf/report.hpp"
 #include "solver/app/command.hpp"
+#include "solver/app/command_line.hpp"
+#include "solver/app/estimate.hpp"
 #include "solver/app/forecast.hpp"
 #include "solver/app/measure.hpp"
 #include "solver/app/report/movie.hpp"
@@ -528,6 +530,10 @@ void add_run(CLI::App& app, Action& chosen)
     command->add_flag("--twins", a->twins, "first the same at 2 and 4 times the spacing: error bars on run-out, height and peak speed");
     command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");
     command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
+    under_heading(*command, "Scene", {"--set", "--force-step"});
+    under_heading(*command, "Results", {"--output", "--force", "--quiet"});
+    under_heading(*command, "Start and stop", {"--restart", "--max-minutes"});
+    under_heading(*command, "Machine", {"--threads", "--force-size"});
     command->callback([=, &chosen] {
         if (restart->count() > 0 && !a->restart) a->restart = "";
         chosen = [=](const Comm& comm) { return Run(comm, *a).go(); };

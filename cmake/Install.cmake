@@ -1,0 +1,78 @@
+# cmake --install: the program, its data, completions and manual page, and the solver library for other programs
+# (find_package(kuzure): kuzure::solver and kuzure::scene, without MPI and HDF5). jobs/package.sh makes a Debian package.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# ---- the program -----------------------------------------------------------------------------------------------------
+if(KUZURE_ISA)
+  install(TARGETS kuzure DESTINATION lib/kuzure/${KUZURE_ISA} COMPONENT program)
+  add_executable(kuzure_launcher solver/app/launcher/launcher.cpp)
+  set_target_properties(kuzure_launcher PROPERTIES OUTPUT_NAME kuzure RUNTIME_OUTPUT_DIRECTORY launcher)
+  install(TARGETS kuzure_launcher DESTINATION bin COMPONENT launcher)
+else()
+  install(TARGETS kuzure DESTINATION bin COMPONENT program)
+endif()
+
+# ---- what the program reads, and what people read ------------------------------------------------------------------------
+foreach(folder machines scenes studies sweeps)
+  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/jobs/${folder})
+    install(DIRECTORY jobs/${folder} DESTINATION share/kuzure COMPONENT data)
+  endif()
+endforeach()
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT data)
+install(FILES README.md README.ja.md ARCHITECTURE.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT data)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT data)
+
+# Completions and the manual page come out of the program's own tables of options, here and now, so they cannot be out
+# of date. A program for another instruction set cannot say them.
+install(CODE "
+  set(program \"$<TARGET_FILE:kuzure>\")
+" COMPONENT data)
+install(CODE [[
+  foreach(one IN ITEMS "bash;share/bash-completion/completions/kuzure" "zsh;share/zsh/site-functions/_kuzure"
+                       "fish;share/fish/vendor_completions.d/kuzure.fish" "man;share/man/man1/kuzure.1")
+    list(GET one 0 what)
+    list(GET one 1 where)
+    execute_process(COMMAND ${program} completion ${what} OUTPUT_VARIABLE text RESULT_VARIABLE failed ERROR_VARIABLE why)
+    if(failed)
+      message(WARNING "no ${where}: ${program} completion ${what} gave ${failed} ${why}")
+    else()
+      set(file "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/${where}")
+      message(STATUS "Installing: ${file}")
+      file(WRITE "${file}" "${text}")
+    endif()
+  endforeach()
+]] COMPONENT data)
+
+# ---- the solver library ------------------------------------------------------------------------------------------------
+foreach(name flags scene solver)
+  set_target_properties(kuzure_${name} PROPERTIES EXPORT_NAME ${name})
+  add_library(kuzure::${name} ALIAS kuzure_${name})
+endforeach()
+set(headers include/kuzure-${PROJECT_VERSION})
+install(TARGETS kuzure_flags kuzure_scene kuzure_solver EXPORT kuzure COMPONENT development
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${headers})
+install(DIRECTORY solver/core solver/scene solver/physics solver/neighbours solver/kernels DESTINATION ${headers}/solver
+        COMPONENT development FILES_MATCHING PATTERN "*.hpp")
+set(config ${CMAKE_INSTALL_LIBDIR}/cmake/kuzure)
+install(EXPORT kuzure FILE kuzureTargets.cmake NAMESPACE kuzure:: DESTINATION ${config} COMPONENT development)
+configure_package_config_file(cmake/kuzureConfig.cmake.in kuzureConfig.cmake INSTALL_DESTINATION ${config})
+write_basic_package_version_file(kuzureConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/kuzureConfig.cmake ${PROJECT_BINARY_DIR}/kuzureConfigVersion.cmake DESTINATION ${config}
+        COMPONENT development)
+
+# ---- the Debian package (jobs/package.sh says which builds go into it) -----------------------------------------------------
+set(CPACK_PACKAGE_NAME kuzure)
+set(CPACK_PACKAGE_CONTACT "the kuzure developers <kuzure@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "collapse of soil masses by smoothed particle hydrodynamics")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Simulates the failure of soil in three dimensions: elasto-plastic Drucker-Prager soil,
+smoothed particle hydrodynamics, MPI ranks with OpenMP threads inside. The same
+bits for any number of ranks and threads. Holds the program for x86-64, AVX2
+and AVX-512 processors; the best is chosen at start.")
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin) # a program without mpirun starts its daemon, too
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "paraview, ffmpeg")
+set(CPACK_STRIP_FILES ON)
+include(CPack)

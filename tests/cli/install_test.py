@@ -1,0 +1,111 @@
+#!/usr/bin/python3
+"""An installed kuzure works from its place, and find_package(kuzure) gives the solver library without MPI and HDF5.
+Run as install_test.py PROGRAM; uses the libraries of PROGRAM's build directory and builds nothing there."""
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PROGRAM = Path(sys.argv[1]).resolve()
+BUILD = PROGRAM.parent
+FAILED = []
+
+CMAKE = """cmake_minimum_required(VERSION 3.22)
+project(consumer CXX)
+find_package(kuzure 0.1 REQUIRED)
+add_executable(consumer main.cpp)
+target_link_libraries(consumer PRIVATE kuzure::solver)
+add_executable(scene_only scene.cpp)
+target_link_libraries(scene_only PRIVATE kuzure::scene)
+"""
+# A stress far outside the cone comes back onto it; a model of the pair pass is chosen and named.
+SOLVER = """#include <solver/kernels/step.hpp>
+#include <solver/physics/drucker_prager.hpp>
+#include <solver/scene/scene.hpp>
+#include <cstdio>
+int main()
+{
+    kuzure::Scene s;
+    s.space.spacing = 0.1;
+    s.soils.push_back({"sand", 1850, 1.8e6, 0.3, 0, 0.4363, 0, kuzure::scene::Cone::Compression, {}});
+    const auto law = kuzure::Elastoplastic<double>::from(kuzure::Material::from(s.soils[0]));
+    const kuzure::Stress trial{-3e3, -1e3, -9e3, 2e3, 0, 5e2};
+    const auto back = kuzure::return_to_cone(trial, law);
+    const auto model = kuzure::choose_model(s, kuzure::Arithmetic::Lanes);
+    const double out = kuzure::yield_function(trial, law), on = kuzure::yield_function(back.sigma, law);
+    std::printf("%s outside %g, on the cone %g, work %g\\n", model->name().c_str(), out, on, back.work);
+    return out > 100 && on < 1e-9 && on > -1e-9 && back.work > 0 && model->cluster_width() > 0 ? 0 : 1;
+}
+"""
+SCENE = """#include <solver/scene/fill.hpp>
+#include <cstdio>
+int main()
+{
+    const kuzure::scene::Lattice cube(kuzure::scene::Box{{0, 0, 0}, {1, 1, 1}}, 0.25, 3);
+    std::printf("%lld\\n", (long long)(cube.size()));
+    return cube.size() == 64 ? 0 : 1;
+}
+"""
+
+
+def check(holds, what):
+    if not holds:
+        FAILED.append(what)
+
+
+def run(*command, cwd=None, expected=0):
+    environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=600, env=environment)
+    check(done.returncode == expected, f"{' '.join(map(str, command))}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+    return done.stdout
+
+
+with tempfile.TemporaryDirectory(prefix="kuzure-install-") as folder:
+    work = Path(folder)
+    prefix = work / "prefix"
+    run("cmake", "--install", BUILD, "--prefix", prefix)
+    program = prefix / "bin/kuzure"
+    for file in ("share/kuzure/scenes/quickstart.toml", "share/kuzure/machines/slurm.toml", "share/doc/kuzure/README.md",
+                 "share/doc/kuzure/docs/tutorial.md", "share/bash-completion/completions/kuzure", "share/zsh/site-functions/_kuzure",
+                 "share/fish/vendor_completions.d/kuzure.fish", "share/man/man1/kuzure.1"):
+        check((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")
+    check(run(program, "--version") == run(PROGRAM, "--version"), "--version of the installed program")
+
+    # Its own profiles, not the sources': one that is only there is found.
+    profile = prefix / "share/kuzure/machines/slurm.toml"
+    (profile.parent / "elsewhere.toml").write_text(profile.read_text())
+    job = run(program, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
+    check(f"'{program}'" in job and job.startswith("#!/bin/bash"), "the batch script does not start the installed program")
+
+    # What a package has: the program under lib/kuzure, the launcher in bin. Scripts must start the launcher.
+    inner = prefix / "lib/kuzure/x86-64/kuzure"
+    inner.parent.mkdir(parents=True)
+    program.rename(inner)
+    program.write_text("stands for the launcher")
+    job = run(inner, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
+    check(f"'{program}'" in job, "the batch script of a packaged program does not start the launcher")
+
+    source = work / "consumer"
+    source.mkdir()
+    (source / "CMakeLists.txt").write_text(CMAKE)
+    (source / "main.cpp").write_text(SOLVER)
+    (source / "scene.cpp").write_text(SCENE)
+    # With the build's own compiler and flags: a library of a sanitizer's build wants the sanitizer.
+    flags = [f"-D{line}" for line in (BUILD / "CMakeCache.txt").read_text().splitlines()
+             if line.startswith(("CMAKE_CXX_COMPILER:", "CMAKE_BUILD_TYPE:", "CMAKE_CXX_FLAGS"))]
+    run("cmake", "-S", source, "-B", work / "build", f"-DCMAKE_PREFIX_PATH={prefix}", *flags,
+        "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON")
+    run("cmake", "--build", work / "build")
+    for name in ("consumer", "scene_only"):
+        print(run(work / "build" / name), end="")
+        linked = run("ldd", work / "build" / name)
+        check("libmpi" not in linked and "hdf5" not in linked, f"{name} is linked with MPI or HDF5:\n{linked}")
+
+    # The control: another version is refused.
+    (source / "CMakeLists.txt").write_text(CMAKE.replace("kuzure 0.1", "kuzure 7.0"))
+    run("cmake", "-S", source, "-B", work / "other", f"-DCMAKE_PREFIX_PATH={prefix}", expected=1)
+
+for what in FAILED:
+    print(what)
+sys.exit(bool(FAILED))
