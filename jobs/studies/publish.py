@@ -2,7 +2,7 @@
 """From the studies' results to what is kept of them: tables and figures of docs/accuracy.md, and the table behind `kuzure check --accuracy`.
 
 publish.py RESULTS: the directory in which jobs/studies/run.sh left a directory for each study. Tables go between the page's
-markers; solver/app/study/measured.inc gets the curves of kuzure's own presets, and only self-references: the distance to an
+markers; solver/app/study/measured.inl gets the curves of kuzure's own presets, and only self-references: the distance to an
 experiment holds the model's error too, which no spacing mends.
 """
 import json
@@ -109,6 +109,6 @@ for name, study in studies.items():
             shutil.copy(figure, ROOT / "docs/figures" / f"accuracy_{name}_{figure.stem.split('_')[0]}{figure.suffix}")
 page.write_text(between(text, "error bars", bars_table(studies)))
 rows = ",\n".join(json.dumps(row) for study in studies.values() for row in curves(study))
-(ROOT / "solver/app/study/measured.inc").write_text(
+(ROOT / "solver/app/study/measured.inl").write_text(
     f'// Made by jobs/studies/publish.py from the studies of docs/accuracy.md: errors by layers of particles. Not to be edited.\nR"json([\n{rows}\n])json"\n')
-print(f"{', '.join(studies)}: docs/accuracy.md, docs/figures/accuracy_*, solver/app/study/measured.inc")
+print(f"{', '.join(studies)}: docs/accuracy.md, docs/figures/accuracy_*, solver/app/study/measured.inl")

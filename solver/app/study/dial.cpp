@@ -21,7 +21,7 @@ namespace {
 const char* const dial_measure = "profile";
 
 constexpr std::string_view measured_text =
-#include "solver/app/study/measured.inc"
+#include "solver/app/study/measured.inl"
     ;
 
 double slope(const MeasuredPoint& a, const MeasuredPoint& b)

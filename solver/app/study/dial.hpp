@@ -1,5 +1,5 @@
 #pragma once
-// From a wanted error to settings: read off the table of measured studies (measured.inc, made by jobs/studies/publish.py).
+// From a wanted error to settings: read off the table of measured studies (measured.inl, made by jobs/studies/publish.py).
 #include "solver/scene/scene.hpp"
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
