@@ -265,6 +265,8 @@ std::vector<Key> make_keys()
         {"effects.damping.until", Number, "s", Required, "", above(0), {}, "0.5", "time at which it is switched off"},
 
         {"accuracy", Table, "", Default, "{}", any, {}, "{ cfl = 0.2 }", "everything that trades error for time"},
+        {"accuracy.preset", Choice, "", Default, fmt::format("\"{}\"", default_preset), any, preset_names(), "\"fast\"",
+         "sets the keys of this section and space.h that are not written (docs/accuracy.md)", book},
         {"accuracy.kernel",
          Choice,
          "",
