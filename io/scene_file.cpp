@@ -142,6 +142,7 @@ template <class A> void describe(A& a, Scene& s)
     a.choice("accuracy.precision", s.accuracy.precision);
     a.choice("accuracy.correction", s.accuracy.correction);
     a.number("accuracy.skin", s.accuracy.skin);
+    a.number("accuracy.sleep_below", s.accuracy.sleep_below);
 
     a.section("output");
     a.optional_text("output.directory", s.output.directory);

@@ -304,6 +304,16 @@ std::vector<Key> make_keys()
          {},
          "0.1",
          "reach of neighbour lists beyond the support: cost only"},
+        {"accuracy.sleep_below",
+         Number,
+         "m/s",
+         Default,
+         "0.0",
+         from(0),
+         {},
+         "0.001",
+         "soil slower than this, and not about to move, among soil that is too, keeps its state until it is looked at again "
+         "(docs/performance.md); 0: never"},
 
         {"output", Table, "", Default, "{}", any, {}, "{ every = 0.05 }", "what a run leaves in its directory", book},
         {"output.directory",

@@ -63,6 +63,7 @@ PhaseReport phase_report(const Timers& timers, const WorkDone& mine, int threads
     report.work = {.steps = team.max(mine.steps),
                    .particle_steps = team.sum(mine.particle_steps),
                    .pairs = team.sum(mine.pairs),
+                   .asleep = team.sum(mine.asleep),
                    .halo_bytes = team.sum(mine.halo_bytes),
                    .messages = team.sum(mine.messages)};
     // Every rank's numbers at its own place of a sum: integers add up the same way everywhere.
@@ -96,6 +97,7 @@ std::string PhaseReport::json() const
                              {"steps", work.steps},
                              {"particle_steps", work.particle_steps},
                              {"pairs", work.pairs},
+                             {"particle_steps_asleep", work.asleep},
                              {"halo_bytes", work.halo_bytes},
                              {"messages", work.messages},
                              {"seconds", total.max},
@@ -139,6 +141,8 @@ std::string PhaseReport::text() const
     line("");
     line("pairs               {} directed, {:.1f} per soil particle and step", grouped(work.pairs),
          each(double(work.pairs), work.particle_steps));
+    if (work.asleep > 0)
+        line("asleep              {:.1f} % of the soil particles' steps", 100 * each(double(work.asleep), work.particle_steps));
     if (work.messages > 0)
         line("halo                {:.1f} kB in {:.1f} messages a rank and step", 1e-3 * each(double(work.halo_bytes) / ranks, work.steps),
              each(double(work.messages) / ranks, work.steps));

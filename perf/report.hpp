@@ -21,6 +21,7 @@ struct WorkDone {
     std::int64_t steps = 0;          // the same on every rank
     std::int64_t particle_steps = 0; // soil particles owned, summed over the steps
     std::int64_t pairs = 0;
+    std::int64_t asleep = 0;                   // of particle_steps: those in which the particle slept
     std::int64_t halo_bytes = 0, messages = 0; // sent to other ranks, once a step
     RankStep first_step{};                     // of these timers; of one rank, so without meaning in a sum
 };

@@ -67,7 +67,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const double records = 2.0 * e.record;
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
-    const double columns = scene::column_bytes(f);
+    const double columns = scene::column_bytes(f) + (s.accuracy.sleep_below > 0 ? 4.0 * double(e.soil) : 0);
     e.memory = columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.walls);
     // Outputs come at steps: never more of them than steps.
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };

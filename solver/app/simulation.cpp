@@ -91,7 +91,8 @@ void Simulation::prepare()
     for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
     particles_.require(field::position, field::velocity, field::half_velocity, field::density, field::half_density, field::stress,
                        field::half_stress, field::plastic_strain, field::sorted_position, field::origin, field::id, field::soil);
-    // Denormals are flushed in every thread, whatever ran before.
+    if (scene_.accuracy.sleep_below > 0) particles_.require(field::activity);
+        // Denormals are flushed in every thread, whatever ran before.
 #pragma omp parallel
     flush_denormals();
 
@@ -185,6 +186,14 @@ double Simulation::next_dt() const
     return clock_.time + dt * (1 + 1e-9) >= end ? end - clock_.time : dt;
 }
 
+Rest Simulation::rest() const
+{
+    // Damping settles a state: there soil is slow before it is at rest.
+    if (scene_.accuracy.sleep_below == 0 || forces_.damping > 0) return Rest::Nobody;
+    const auto phase = clock_.step % scene::steps_between_looks(scene_);
+    return phase == 0 ? Rest::Look : phase == 1 ? Rest::FallAsleep : Rest::Keep;
+}
+
 bool Simulation::outgrown() const { return !built_ || 2 * std::sqrt(clock_.extremes.moved2) > skin_ * (1 - 1e-6); }
 
 Wishes Simulation::step(Wishes mine)
@@ -230,7 +239,10 @@ Wishes Simulation::step(Wishes mine)
                          .evolving = evolving_,
                          .energy_unit = clock_.energy_unit,
                          .low = scene_.space.low,
-                         .high = scene_.space.high};
+                         .high = scene_.space.high,
+                         .rest = rest(),
+                         .calm_speed = scene_.accuracy.sleep_below,
+                         .nap = double(scene::steps_between_looks(scene_) - 1) * dt};
             for (int axis = 0; axis < 3; ++axis) // a periodic axis has no way out
                 if (scene_.space.periodic[axis] && pass.low) {
                     const double all = std::numeric_limits<double>::infinity();
@@ -278,7 +290,7 @@ Wishes Simulation::step(Wishes mine)
         },
         buffers_);
 
-    my_pairs_ += result.pairs;
+    my_pairs_ += result.pairs, my_asleep_ += result.asleep;
     my_halo_bytes_ += halo_->bytes_per_refresh(), my_messages_ += halo_->messages_per_refresh();
     if (!first_step_) first_step_ = {particles_.size(), result.pairs, n_ghosts_, halo_->bytes_per_refresh(), halo_->messages_per_refresh()};
     my_particle_steps_ += particles_.size();
@@ -296,6 +308,9 @@ Wishes Simulation::step(Wishes mine)
         clock_.extremes = {all[0], all[1], all[2], all[3], all[4], all[5], all[6], all[7]};
         mine = {all[8] != 0, all[9] != 0};
     });
+    // Who sleeps does not report: the step is never longer than the soil at rest allows.
+    if (scene_.accuracy.sleep_below > 0)
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
     pruned_way_ += dt * std::sqrt(clock_.extremes.drift2);
     judge_step();
     return mine;
@@ -665,7 +680,7 @@ void Simulation::make_records()
             const Index n = p.size();
             const std::size_t count = std::size_t(n) + n_ghosts_ + Particles::padding + 1;
             buffers.now.resize(count), buffers.next.resize(count);
-            const bool tensile = model_->tensile();
+            const bool tensile = model_->tensile(), sleepy = p.has(field::activity);
             if (tensile) buffers.tension.resize(count), buffers.next_tension.resize(count);
             const double epsilon = scene_.effects.artificial_stress ? scene_.effects.artificial_stress->epsilon : 0;
 #pragma omp parallel for schedule(static)
@@ -674,6 +689,7 @@ void Simulation::make_records()
                 const double rho = p[field::density][i];
                 buffers.now[i] = make_record<T>(buffers.place, p[field::position][i], p[field::velocity][i],
                                                 scene_.particle_volume() * m.density / rho, rho, p[field::stress][i], m.sound_speed);
+                if (sleepy) buffers.now[i].restless = T(p[field::activity][i] == std::int32_t(Activity::Moves) ? 1 : 0);
                 if (tensile) buffers.tension[i] = make_tension<T>(p[field::stress][i], epsilon);
             }
             for (std::size_t k = n; k < count; ++k) {
@@ -719,7 +735,7 @@ Clock Simulation::clock() const
 
 WorkDone Simulation::work_done() const
 {
-    return {clock_.step, my_particle_steps_, my_pairs_, my_halo_bytes_, my_messages_, first_step_.value_or(RankStep{})};
+    return {clock_.step, my_particle_steps_, my_pairs_, my_asleep_, my_halo_bytes_, my_messages_, first_step_.value_or(RankStep{})};
 }
 
 std::size_t Simulation::memory_bytes() const

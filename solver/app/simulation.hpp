@@ -129,6 +129,8 @@ private:
     void renew_walls();
     void make_records();
     bool outgrown() const;
+    /// What the next pass does about soil at rest.
+    Rest rest() const;
     /// True where the pruned lists no longer hold everything in reach: then with a margin for the steps to come.
     bool prune_lists_anew(double dt);
     void count_work(Phase, std::int64_t pairs, std::size_t clusters);
@@ -171,7 +173,7 @@ private:
     Clock clock_;
     bool built_ = false;
     double busy_before_ = 0, busy_since_cut_ = 0; // s
-    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0, my_halo_bytes_ = 0, my_messages_ = 0;
+    std::int64_t my_pairs_ = 0, my_particle_steps_ = 0, my_asleep_ = 0, my_halo_bytes_ = 0, my_messages_ = 0;
     std::optional<RankStep> first_step_;
     Structure structure_;
     struct Good {

@@ -50,9 +50,16 @@ inline constexpr struct Id : Field<"id", "1", Shape::Scalar, std::int64_t> {
 } id;
 inline constexpr struct Soil : Field<"soil", "1", Shape::Scalar, std::int32_t> {
 } soil;
+// Only where soil may sleep (accuracy.sleep_below): a value of Activity.
+inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::int32_t> {
+} activity;
 } // namespace field
 
-using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
-                             field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil>;
+/// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
+enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
+
+using AllFields =
+    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
+               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -53,7 +53,7 @@ template <class V> struct Here {
     V rho, c;
     Index first;
     int count;
-    unsigned owned; // a bit for each lane that holds a particle of this cluster
+    unsigned owned, moving; // a bit for each lane that holds a particle of this cluster, and one that is not asleep
 };
 
 /// Keeps of a list, in its order, what is nearer than `reach` to any particle of the cluster; returns how many.
@@ -68,6 +68,19 @@ KUZURE_INLINE Index prune(const Here<V>& i, std::span<const Index> list, const R
         n += (bits(less(dot(r, r), reach2)) & i.owned) != 0;
     }
     return n;
+}
+
+/// Lanes that have a restless particle within the support; `support` in the records' unit.
+template <class V, class T> unsigned restless_near(const Here<V>& i, std::span<const Index> near, const Record<T>* records, double support)
+{
+    const V support2(T(support * support));
+    unsigned lanes = 0;
+    for (const Index k : near) {
+        if (records[k].restless == T(0)) continue;
+        const Vec3<V> r = i.position.minus(records[k]);
+        lanes |= bits(less(dot(r, r), support2));
+    }
+    return lanes;
 }
 
 /// Sums of one cluster, in double, ready for the update: rows of W lanes.
@@ -241,7 +254,8 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
     T in_lane[width<V>];
     store(in_lane, inside);
     std::int64_t pairs = 0;
-    for (int k = 0; k < i.count; ++k) pairs += std::int64_t(in_lane[k]);
+    for (int k = 0; k < i.count; ++k)
+        if (i.moving >> k & 1) pairs += std::int64_t(in_lane[k]);
     return pairs;
 }
 
@@ -329,7 +343,7 @@ template <class Model, class V, class T>
             const V r2_exact = dot(r, r), r2 = max(r2_exact, tiny);
             const unsigned hits = bits(less(r2_exact, support2)) & i.owned;
             if (!hits) continue;
-            pairs += std::popcount(hits);
+            pairs += std::popcount(hits & i.moving);
             const V rho_sum = i.rho + i.rho;
             const auto inv = roots<Model::Kernel::divides>(r2, (r2 + softening) * rho_sum);
             const V w = model.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root);
@@ -387,14 +401,15 @@ template <class U> struct Accumulated {
     U acceleration2{0.0}, signal{0.0}, moved2{0.0}, speed2{0.0}, drift2{0.0}, strained{0.0};
     U not_finite{0.0}; // zero, or not a number
     double outside = 0;
-    std::int64_t pairs = 0;
+    std::int64_t pairs = 0, asleep = 0;
     PassResult result() const
     {
         // exact sums: their order does not count
         return {{sum(plastic), sum(viscous), sum(wall), sum(damping)},
                 {largest(acceleration2), largest(signal), largest(moved2), largest(speed2), largest(drift2),
                  sum(not_finite) == 0 ? 0.0 : 1.0, outside, largest(strained)},
-                pairs};
+                pairs,
+                asleep};
     }
 };
 
@@ -425,9 +440,11 @@ template <class U> KUZURE_INLINE U quantized(U x, U magic) { return (x + magic) 
 
 /// The constitutive law and the leap-frog of the first n lanes at particle `at`; `row` is the lane offset in the sums.
 /// Legend: half-step values carry _h; those at the step's end are predicted from them with half a step of the rates.
+/// `moving`, `restless`: a bit for each lane of the cluster that is not asleep, and that has a restless neighbour.
 template <class U, class Model, class T, int W>
 KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W, Model>& sums, const double* wall_power, int row, Index at,
-                           int n, double scale, double unit, int dimensions, const Places<T>& place, Accumulated<U>& total)
+                           int n, unsigned moving, unsigned restless, double scale, double unit, int dimensions, const Places<T>& place,
+                           Accumulated<U>& total)
 {
     auto& p = *pass.particles;
     const auto vx = p[field::velocity], vh = p[field::half_velocity], xx = p[field::position], x_sorted = p[field::sorted_position];
@@ -527,18 +544,36 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     }
 
     // ---- half-step values: one whole kick. The stress rotates with the material, then the strain loads it.
-    const Vec3<U> v_h = fma(kick, a, vh.template load<U>(at));
-    const U rho_h = fma(kick, rho_rate, rh.template load<U>(at));
+    Vec3<U> v_h = fma(kick, a, vh.template load<U>(at));
+    U rho_h = fma(kick, rho_rate, rh.template load<U>(at));
     const Sym3<U> loading = half * (hooke(kick * D, soil) + kick * diffusion); // half before the turn and half after: second order in time
-    const auto mapped = return_to_cone(rotate(spin_increment(L, kick), sh.template load<U>(at) + loading) + loading, soil);
+    auto mapped = return_to_cone(rotate(spin_increment(L, kick), sh.template load<U>(at) + loading) + loading, soil);
 
     // ---- values at the end of the step: half a step on from there
-    const Vec3<U> x = fma(dt, v_h, xx.template load<U>(at));
-    const Vec3<U> v_end = fma(half_dt, a, v_h);
-    const U rho_end = fma(half_dt, rho_rate, rho_h);
-    const Sym3<U> s_end =
+    Vec3<U> x = fma(dt, v_h, xx.template load<U>(at));
+    Vec3<U> v_end = fma(half_dt, a, v_h);
+    U rho_end = fma(half_dt, rho_rate, rho_h);
+    Sym3<U> s_end =
         return_to_cone(mapped.sigma + spin(spin_increment(L, half_dt), mapped.sigma) + hooke(half_dt * D, soil) + half_dt * diffusion, soil)
             .sigma;
+    // ---- lanes beyond the n-th hold other clusters' particles, or nothing; sleepers keep their state
+    double number_of[width<U>];
+    for (int k = 0; k < width<U>; ++k) number_of[k] = moving >> (row + k) & 1 ? k : width<U>;
+    const auto mine = less(load<U>(number_of), U(double(n)));
+    if (pass.rest == Rest::Keep) {
+        const auto or_old = [&](U now, U old) { return select(mine, now, old); };
+        const auto vector = [&](Vec3<U> now, Vec3<U> old) {
+            return Vec3<U>{or_old(now.x, old.x), or_old(now.y, old.y), or_old(now.z, old.z)};
+        };
+        const auto tensor = [&](Sym3<U> now, Sym3<U> old) {
+            return Sym3<U>{or_old(now.xx, old.xx), or_old(now.yy, old.yy), or_old(now.zz, old.zz),
+                           or_old(now.xy, old.xy), or_old(now.yz, old.yz), or_old(now.xz, old.xz)};
+        };
+        x = vector(x, xx.template load<U>(at)), v_h = vector(v_h, vh.template load<U>(at)), v_end = vector(v_end, v);
+        rho_h = or_old(rho_h, rh.template load<U>(at)), rho_end = or_old(rho_end, rho);
+        mapped.sigma = tensor(mapped.sigma, sh.template load<U>(at)), s_end = tensor(s_end, sigma);
+        mapped.shear_strain = or_old(mapped.shear_strain, zero);
+    }
     const U volume_end = U(pass.volume) * rho0 / rho_end;
 
     xx.store(at, x, n);
@@ -562,13 +597,29 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
         r.volume = T(rows[6][k]), r.density = T(rows[7][k]);
         r.xx = T(rows[8][k]), r.yy = T(rows[9][k]), r.zz = T(rows[10][k]);
         r.xy = T(rows[11][k]), r.yz = T(rows[12][k]), r.xz = T(rows[13][k]);
-        r.sound_speed = T(lane(c, k)), r.spare = T(0);
+        r.sound_speed = T(lane(c, k)), r.restless = T(0);
         if constexpr (Model::tensile)
             pass.next_tension[at + k] = make_tension<T>(Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]},
                                                         model.artificial_stress.epsilon);
     }
 
-    // ---- energy: exact sums of rounded addends; extremes; both over the first n lanes
+    // ---- who is calm
+    if (pass.rest == Rest::Look || pass.rest == Rest::FallAsleep) {
+        const auto activity = p[field::activity];
+        for (int k = 0; k < n; ++k) {
+            const auto size = [k](const Vec3<U>& b) { return length(Vector{lane(b.x, k), lane(b.y, k), lane(b.z, k)}); };
+            const bool calm = size(v_end) + pass.nap * size(a) < pass.calm_speed;
+            const bool alone = (restless >> (row + k) & 1) == 0;
+            const auto now = !calm                     ? Activity::Moves
+                             : pass.rest == Rest::Look ? Activity::Calm
+                             : alone                   ? Activity::Asleep
+                                                       : Activity::Moves;
+            activity.set(at + k, std::int32_t(now));
+            pass.next[at + k].restless = T(calm ? 0 : 1);
+        }
+    }
+
+    // ---- energy: exact sums of rounded addends; extremes; both over the lanes that moved
     const U magic(pass.energy_unit * 6755399441055744.0);
     const U volume = U(pass.volume) * rho0 * inverse_rho;
     // viscous power of i's half of its pairs: V_i/2 sum_j V_j rho_i rho_j Pi approach |grad W|/r
@@ -581,10 +632,6 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     const U signal = fma(U(pass.h), sqrt(contract(D, D)), c);
     const U finite = fma(zero, a2, fma(zero, v2, fma(zero, trace(s_end), zero * rho_end)));
     const U walled = quantized(volume * load<U>(wall_power + row) * kick, magic);
-    // lanes beyond the n-th hold other clusters' particles, or nothing
-    double number_of[width<U>];
-    for (int k = 0; k < width<U>; ++k) number_of[k] = k;
-    const auto mine = less(load<U>(number_of), U(double(n)));
     total.plastic += select(mine, worked, zero);
     total.viscous += select(mine, viscous, zero);
     total.damping += select(mine, damped, zero);
@@ -629,7 +676,7 @@ public:
         return 72 + (Model::viscous ? 18 : 0) + (Model::tensile ? 40 : 0) + (Model::diffusive ? 23 : 0) + (Model::corrected ? 12 : 0);
     }
     // scaled sums 9, force 27, rates 25, rotation 110, two strain increments 50, two returns to the cone 80, values 70
-    double flops_per_particle() const override { return 371; }
+    double flops_per_particle() const override { return 494; }
     // columns read 23 and written 21, one record read and one written, four bytes a list entry
     double bytes_per_particle() const override { return 44 * 8 + 2 * sizeof(Record<T>) + 4 * 120.0 / width<V>; }
 
@@ -666,10 +713,14 @@ private:
         using U = pass::Update<V>;
         constexpr int W = width<V>;
         const auto& store = *p.particles;
+        if (p.rest == Rest::Keep && keep_asleep(p, cluster, total)) return;
         pass::Here<V> i;
         i.first = p.lists->first(cluster);
         i.count = p.lists->count(cluster);
-        i.owned = (1u << i.count) - 1;
+        i.owned = i.moving = (1u << i.count) - 1;
+        if (p.rest == Rest::Keep)
+            for (int k = 0; k < i.count; ++k)
+                if (store[field::activity][i.first + k] == std::int32_t(Activity::Asleep)) i.moving &= ~(1u << k), ++total.asleep;
         i.position = pass::positions_of<V>(p.records, i.first);
         const auto v = store[field::velocity];
         i.v = {pass::load_narrow<V>(v.column[0] + i.first), pass::load_narrow<V>(v.column[1] + i.first),
@@ -685,17 +736,34 @@ private:
         double wall_power[W + width<U>] = {};
         // every particle meets itself once in its list
         const auto pruned = p.lists->pruned(cluster);
-        if (p.prune) {
+        if (p.prune || pruned.n < 0) {
             const double reach = 2 * model_.kernel.h + p.margin / unit_;
             pruned.n = pass::prune(i, p.lists->soil(cluster), p.records, reach, pruned.entries);
         }
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
-        total.pairs += pass::sum_over_soil(model_, i, near, p.records, p.tension, sums) - i.count;
+        total.pairs += pass::sum_over_soil(model_, i, near, p.records, p.tension, sums) - std::popcount(i.moving);
+        unsigned restless = 0;
+        if (p.rest == Rest::FallAsleep) restless = pass::restless_near(i, near, p.records, 2 * model_.kernel.h);
         const auto walls = p.lists->walls(cluster);
         if (!walls.empty()) total.pairs += pass::sum_over_walls(model_, i, p, walls, unit_, dimensions_, scale_, sums, wall_power);
         for (int row = 0; row < i.count; row += width<U>)
-            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), scale_, unit_, dimensions_,
-                             place_, total);
+            pass::advance<U>(p, model_, sums, wall_power, row, i.first + row, std::min(width<U>, i.count - row), i.moving, restless, scale_,
+                             unit_, dimensions_, place_, total);
+    }
+
+    /// True if the whole cluster sleeps: its records are handed on, and its list is pruned when it wakes.
+    static bool keep_asleep(const Pass<T>& p, Index cluster, pass::Accumulated<pass::Update<V>>& total)
+    {
+        const Index first = p.lists->first(cluster);
+        const int count = p.lists->count(cluster);
+        const std::int32_t* activity = std::as_const(*p.particles)[field::activity].column[0] + first;
+        for (int k = 0; k < count; ++k)
+            if (activity[k] != std::int32_t(Activity::Asleep)) return false;
+        std::copy_n(p.records + first, count, p.next + first);
+        if constexpr (Model::tensile) std::copy_n(p.tension + first, count, p.next_tension + first);
+        if (p.prune) p.lists->pruned(cluster).n = -1;
+        total.asleep += count;
+        return true;
     }
 
     double unit_;

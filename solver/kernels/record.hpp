@@ -17,7 +17,7 @@ template <class T> struct alignas(16 * sizeof(T)) Record {
     T volume, density;
     T xx, yy, zz, xy, yz, xz;
     T sound_speed;
-    T spare;
+    T restless; // 1 where soil that may sleep was not calm at the last look, else 0
 };
 static_assert(sizeof(Record<double>) == 128 && sizeof(Record<float>) == 64);
 

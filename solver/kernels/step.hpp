@@ -47,6 +47,10 @@ struct StepForces {
     double damping = 0; // 1/s: -damping v
 };
 
+/// What a pass does about soil at rest. Nobody sleeps; or a look at who is calm, neither moving nor about to (|v| + nap |a|
+/// below a speed); or those fall asleep who are calm among calm neighbours, by the look of the pass before; or sleepers keep their state.
+enum class Rest { Nobody, Look, FallAsleep, Keep };
+
 /// Everything one pass reads and writes. Columns of `particles`: position, velocity, density, stress, plastic_strain
 /// and their half-step twins.
 template <class T> struct Pass {
@@ -69,19 +73,22 @@ template <class T> struct Pass {
     bool evolving = false;            // a soil's cone changes with strain or its rate
     double energy_unit;               // J
     std::optional<Vector> low, high;
+    Rest rest = Rest::Nobody;       // else `particles` has field::activity
+    double calm_speed = 0, nap = 0; // m/s, s: until a sleeper moves again at the earliest
 };
 
 struct PassResult {
     EnergySums energy;
     Extremes extremes;
     std::int64_t pairs = 0;
+    std::int64_t asleep = 0; // particles whose state was kept
 
     /// What two passes, or two threads of one, report together.
     void add(const PassResult& o)
     {
         energy.plastic += o.energy.plastic, energy.viscous += o.energy.viscous;
         energy.wall += o.energy.wall, energy.damping += o.energy.damping;
-        pairs += o.pairs;
+        pairs += o.pairs, asleep += o.asleep;
         Extremes& x = extremes;
         const Extremes& y = o.extremes;
         x = {max(y.acceleration2, x.acceleration2),

@@ -36,7 +36,7 @@ public:
     Index first(Index c) const { return first_[c]; }
     int count(Index c) const { return count_[c]; }
     std::span<const Index> soil(Index c) const { return {soil_[c], std::size_t(n_soil_[c])}; }
-    /// What the last pruning pass kept of soil(c), written by that pass: room for all of it.
+    /// What the last pruning pass kept of soil(c), written by that pass: room for all of it; n < 0: not pruned yet.
     struct Pruned {
         Index* entries;
         Index& n;

@@ -377,6 +377,9 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
     } else if (scene.accuracy.cfl > recommended_courant) {
         rules.warning("accuracy.cfl", text("{} is stable but above the recommended {}", scene.accuracy.cfl, recommended_courant));
     }
+    if (scene.accuracy.sleep_below > 0 && steps_between_looks(scene) < 3)
+        rules.warning("accuracy.sleep_below",
+                      "nothing will sleep: in steps this long a P-wave crosses half a support; 0, or a smaller step");
 }
 
 void check_inside(const Scene& scene, Rules& rules)
@@ -413,6 +416,12 @@ double crossing_time(const Scene& scene)
     return least;
 }
 double recommended_step(const Scene& scene) { return recommended_courant * crossing_time(scene); }
+std::int64_t steps_between_looks(const Scene& scene)
+{
+    // n steps after the look at everybody the first neighbours may have changed: n dt c_p <= 2 h
+    const double courant = scene.time.step ? *scene.time.step / crossing_time(scene) : scene.accuracy.cfl;
+    return 1 + std::int64_t(std::min(2 / courant, 1e6));
+}
 double stable_step(const Scene& scene) { return unstable_courant * crossing_time(scene); }
 
 void resolve(Scene& scene)
@@ -466,6 +475,11 @@ void resolve(Scene& scene)
          scene.accuracy.correction == Correction::Gradient
              ? "velocity gradients exact for linear fields; stress power no longer that of the pair forces"
              : "accuracy.correction = \"none\"");
+
+    note("sleep", scene.accuracy.sleep_below > 0,
+         scene.accuracy.sleep_below > 0 ? text("soil slower than {:.3g} m/s among soil as slow keeps its state, looked at every {} steps",
+                                               scene.accuracy.sleep_below, steps_between_looks(scene))
+                                        : "accuracy.sleep_below = 0");
 
     if (const auto& d = effects.damping) note("damping", true, text("{:.6g} of critical until t = {:.6g} s", d->ratio, d->until));
     else note("damping", false, unwritten);
@@ -544,7 +558,9 @@ Issues check(const Scene& scene, StepLimit limit)
 double column_bytes(const Filling& filling)
 {
     double bytes = 0;
-    const auto add = [&]<class F>(F) { bytes += double(sizeof(typename F::Number)) * F::components; };
+    const auto add = [&]<class F>(F) {
+        if (!std::is_same_v<F, field::Activity>) bytes += double(sizeof(typename F::Number)) * F::components; // only where soil may sleep
+    };
     std::apply([&](auto... f) { (add(f), ...); }, AllFields{});
     return bytes * double(filling.soil_count());
 }

@@ -18,6 +18,9 @@ double crossing_time(const Scene&);
 /// Fixed steps (s) up to here are stable with margin, and up to there stable at all.
 double recommended_step(const Scene&);
 double stable_step(const Scene&);
+/// Every so many steps soil that may sleep (accuracy.sleep_below) is looked at: no sooner can a P-wave that was nowhere near a sleeper,
+/// not within its support, have reached it.
+std::int64_t steps_between_looks(const Scene&);
 
 /// What a step above the stable limit is: an error, or a warning for --force-step.
 enum class StepLimit { Enforce, Force };

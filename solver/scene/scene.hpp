@@ -13,7 +13,8 @@ struct Accuracy {
     double cfl = 0.2;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;
-    double skin = 0.1; // list skin in support radii (2 h): cost only, results change in their last bits
+    double skin = 0.1;      // list skin in support radii (2 h): cost only, results change in their last bits
+    double sleep_below = 0; // m/s; soil that is slower, among soil that is slower, sleeps; 0: never
     bool operator==(const Accuracy&) const = default;
 };
 

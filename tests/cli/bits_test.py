@@ -71,7 +71,7 @@ rate_friction = { friction_angle = 33.0, grain = 0.001 }""",
     "high = [1.6, 0.24, 0.0] }": "surface = { friction_angle = 20.0 }",
     "[effects]": """stress_diffusion = { zeta = 0.1 }
 pore_pressure = { table = [[0.0, 0.3], [1.0, 0.1]] }
-damping = { ratio = 0.02, until = 0.01 }""",
+damping = { ratio = 0.02, until = 0.005 }""",
     "[accuracy]": 'correction = "gradient"',
 }
 try:
@@ -81,6 +81,7 @@ try:
         "dry, mixed": dict(cohesion=0.0, beta=0.0, precision="mixed"),
         "every effect, double": dict(cohesion=3000.0, beta=0.5, precision="double"),
         "every effect, mixed": dict(cohesion=3000.0, beta=0.5, precision="mixed"),
+        "every effect, mixed, asleep": dict(cohesion=3000.0, beta=0.5, precision="mixed"),
     }.items():
         tag = name.replace(", ", "-").replace(" ", "-")
         scene = os.path.join(work, tag + ".toml")
@@ -90,9 +91,15 @@ try:
                 for key, more in EVERY_EFFECT.items():
                     assert key in text
                     text = text.replace(key, key + "\n" + more)
+            if name.endswith("asleep"):
+                text = text.replace("skin = 0.05", "skin = 0.05\nsleep_below = 5.15")
             f.write(text)
         one = run(scene, tag + "-1x1")
         check(one["rebuilds"] > 5, f"{name}: {one['rebuilds']} rebuilds")
+        with open(os.path.join(work, tag + "-1x1", "timers.json")) as f:
+            timers = json.load(f)
+        asleep = timers["particle_steps_asleep"] / timers["particle_steps"]
+        check(0.1 < asleep < 0.9 if name.endswith("asleep") else asleep == 0, f"{name}: {asleep:.2f} of the soil's steps are slept through")
         for ranks, threads in ((1, 2), (2, 1), (4, 1), (7, 1)):
             out = f"{tag}-{ranks}x{threads}"
             other = run(scene, out, ranks, threads, ["--recut-every", "3"])
