@@ -245,8 +245,8 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
             for (const auto& candidate : {previous, file})
                 if (std::filesystem::exists(candidate)) good = candidate.string();
         good = team.broadcast(good);
-        throw IoFailed(good.empty() ? fmt::format("{}. No checkpoint was written before this one", e.what())
-                                    : fmt::format("{}. The last good checkpoint is {}", e.what(), good));
+        throw CheckpointFailed(good.empty() ? fmt::format("{}. No checkpoint was written before this one", e.what())
+                                            : fmt::format("{}. The last good checkpoint is {}", e.what(), good));
     }
     return file;
 }

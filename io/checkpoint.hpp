@@ -15,12 +15,17 @@ struct Checkpoint {
     std::string header;         // the caller's own text (time, step, counters ...)
 };
 
+/// A checkpoint that could not be written; its words name the one that is still good.
+struct CheckpointFailed : IoFailed {
+    using IoFailed::IoFailed;
+};
+
 /// Size of a checkpoint of that many particles.
 std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_particle);
 
 /// Collective. Writes every present field to directory/checkpoint.h5; the checkpoint before it becomes
 /// checkpoint.prev.h5. Until the new one is whole and on the disk, the old ones stay as they are. Throws
-/// IoFailed, naming the checkpoint that is still good. Gives the file's path.
+/// CheckpointFailed. Gives the file's path.
 Path write_checkpoint(const Team&, const Path& directory, const Particles&, const std::string& scene_hash, const std::string& header);
 
 /// Collective. Replaces the particles: each rank gets a contiguous share of the rows as written, with the

@@ -35,7 +35,10 @@ constexpr Map viridis = {{{68, 1, 84},
                           {94, 201, 98},
                           {173, 220, 48},
                           {253, 231, 37}}};
-constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48};
+constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48}, broken_red = {222, 30, 38};
+
+/// Values that can be compared with others: of a state whose numbers failed, not all can.
+bool usable(double v) { return std::fabs(v) < 1e100; }
 
 Rgb pick(const Map& map, double t)
 {
@@ -93,7 +96,7 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
 {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (const double v : values)
-        if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+        if (usable(v)) low = std::min(low, v), high = std::max(high, v);
     low = team.min(low), high = team.max(high);
     if (low > high) return {0, 1};
     const bool from_zero = color != scene::Color::Pressure;
@@ -103,7 +106,7 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
         std::vector<std::int64_t> count(2048);
         const double per_bin = double(count.size()) / (high - low);
         for (const double v : values)
-            if (std::isfinite(v)) ++count[std::min(std::size_t((v - low) * per_bin), count.size() - 1)];
+            if (usable(v)) ++count[std::min(std::size_t((v - low) * per_bin), count.size() - 1)];
         team.sum(std::span<std::int64_t>(count));
         std::int64_t all = 0, seen = 0;
         for (const auto c : count) all += c;
@@ -297,6 +300,20 @@ void scale_bar(Canvas& canvas, double pixels_per_metre)
                 Anchor::Middle);
 }
 
+void ring(Canvas& canvas, double x, double y, double radius)
+{
+    const int sides = 48;
+    const auto corner = [&](int k) {
+        const double a = 2 * std::numbers::pi * k / sides;
+        return std::pair{x + radius * std::cos(a), y + radius * std::sin(a)};
+    };
+    for (int k = 0; k < sides; ++k) {
+        const auto [x0, y0] = corner(k);
+        const auto [x1, y1] = corner(k + 1);
+        canvas.line(x0, y0, x1, y1, 3, broken_red);
+    }
+}
+
 std::string cut_to_width(std::string title, double size, double width)
 {
     if (Canvas::text_width(size, title) <= width) return title;
@@ -355,12 +372,15 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
 
     std::vector<Splat> splats;
     splats.reserve(shown_soil.size() + walls.size());
+    const double around = std::max({shown.high.x - shown.low.x, shown.high.y - shown.low.y, shown.high.z - shown.low.z});
+    const auto near = [&](double v, double low, double high) { return v > low - around && v < high + around; };
     const auto add = [&](Vector at, Rgb color) {
         if (flat) at.y = 0;
-        if (std::isfinite(at.x) && std::isfinite(at.y) && std::isfinite(at.z))
+        if (near(at.x, shown.low.x, shown.high.x) && near(at.y, shown.low.y, shown.high.y) && near(at.z, shown.low.z, shown.high.z))
             splats.push_back({float(camera.x(at)), float(camera.y(at)), float(camera.depth(at)), color});
     };
-    for (std::size_t k = 0; k < values.size(); ++k) add(x[shown_soil[k]], pick(q.map, (values[k] - range.low) / (range.high - range.low)));
+    for (std::size_t k = 0; k < values.size(); ++k)
+        add(x[shown_soil[k]], usable(values[k]) ? pick(q.map, (values[k] - range.low) / (range.high - range.low)) : broken_red);
     for (const Vector& w : walls.position) {
         bool seen = w.x > shown.low.x && w.x < shown.high.x && (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
                     w.z < shown.high.z && in_slice(w.y);
@@ -411,6 +431,11 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         const std::string time = fmt::format("t = {:.3f} s", label.time);
         canvas.text(label.width - 60, 52, 20, time, ink, Anchor::Right);
         canvas.text(60, 52, 18, cut_to_width(label.title, 18, label.width - 200 - Canvas::text_width(20, time)), ink);
+        if (label.mark) {
+            const Vector at{label.mark->x, flat ? 0 : label.mark->y, label.mark->z};
+            if (near(at.x, shown.low.x, shown.high.x) && near(at.y, shown.low.y, shown.high.y) && near(at.z, shown.low.z, shown.high.z))
+                ring(canvas, camera.x(at) / fine, camera.y(at) / fine, std::max(1.7 * radius / fine, 14.0));
+        }
         color_bar(canvas, q, range);
         scale_bar(canvas, camera.scale / fine);
         write_atomically(file, canvas.png());

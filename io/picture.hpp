@@ -16,9 +16,10 @@ struct PictureLabel {
     Vector low, high;   // m, box to frame: where the soil stands, over all ranks
     double spacing = 0; // m, diameter of a particle
     std::string title;
-    double time = 0;                // s
-    double middle_y = 0;            // m, where View::Cut cuts
-    int width = 1600, height = 900; // pixels
+    double time = 0;                 // s
+    double middle_y = 0;             // m, where View::Cut cuts
+    int width = 1600, height = 900;  // pixels
+    std::optional<Vector> mark = {}; // m, what a red ring is drawn around, if the picture shows it; the same on all ranks
 };
 
 /// The box around the soil of all ranks. Collective. A point at the origin where there is none.
@@ -28,8 +29,9 @@ struct Extent {
 Extent soil_extent(const Team&, const Particles&);
 
 /// Collective; rank 0 writes a PNG file. Needs the columns of what colours it: origin, velocity or stress; a
-/// plastic strain nobody carries is zero. Memory: 8 bytes x 4 samples x a tenth of the picture, on every
-/// rank. Throws IoFailed.
+/// plastic strain nobody carries is zero, a value that is no number red. What lies far outside the frame is left out.
+/// Memory: 8 bytes x 4
+/// samples x a tenth of the picture, on every rank. Throws IoFailed.
 void write_picture(const Team&, const Path& file, const Particles&, const WallPoints&, const PictureLabel&);
 
 } // namespace kuzure::io

@@ -433,6 +433,11 @@ std::string read_scene_text(const std::filesystem::path& path) { return read_doc
 
 Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
 {
+    return parse_ready_scene(text, name, sets, limit).scene;
+}
+
+scene::Ready parse_ready_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
+{
     Document file(text, name, scene_keys(), sets);
     apply_preset(file.root);
     file.check(one_shape);
@@ -443,13 +448,15 @@ Scene parse_scene(std::string_view text, const std::string& name, std::span<cons
     file.throw_if_any();
 
     scene::resolve(scene);
-    for (const auto& issue : scene::check(scene, limit))
+    scene::Issues issues;
+    auto ready = scene::ready(std::move(scene), limit, issues);
+    for (const auto& issue : issues)
         if (issue.severity == scene::Severity::Error)
             file.complain(issue.key, issue.other.empty()
                                          ? issue.text
                                          : fmt::format("{} ({} is at {})", issue.text, issue.other, file.place(issue.other)));
     file.throw_if_any();
-    return scene;
+    return std::move(*ready);
 }
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> sets, scene::StepLimit limit)

@@ -18,6 +18,9 @@ std::string read_scene_text(const std::filesystem::path&);
 Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets = {},
                   scene::StepLimit = scene::StepLimit::Enforce);
 
+/// The same, with its warnings and the particles it starts with.
+scene::Ready parse_ready_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit);
+
 /// parse_scene of read_scene_text. Throws BadInput.
 Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {}, scene::StepLimit = scene::StepLimit::Enforce);
 

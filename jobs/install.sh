@@ -2,6 +2,7 @@
 # Install what kuzure needs (Debian 12 or later, Ubuntu 24.04 or later): as root, or with a sudo that asks no password.
 #   jobs/install.sh          to build and run
 #   jobs/install.sh tests    also what only the test suite needs
+#   jobs/install.sh extras   also a browser for the report's test and ffmpeg for films; Ubuntu has Chromium as a snap only
 #   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
@@ -12,15 +13,18 @@ libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlpl
 scripts=(python3 python3-h5py python3-numpy)
 command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
 tests=(clang-format valgrind binutils dpkg-dev fakeroot)
+extras=(ffmpeg)
+command -v chromium >/dev/null || extras+=(chromium)
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
 case "${1-}" in
 "") ;;
 tests) packages+=("${tests[@]}") ;;
+extras) packages+=("${extras[@]}") ;;
 cluster) packages+=("${tests[@]}" "${cluster[@]}") ;;
 *)
-    echo "usage: jobs/install.sh [tests|cluster]" >&2
+    echo "usage: jobs/install.sh [tests|extras|cluster]" >&2
     exit 2
     ;;
 esac
@@ -70,7 +74,7 @@ apt() { # an apt-get that waits for other installers, asks nothing, and keeps it
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive NEEDRESTART_MODE=a apt-get -q -y -o DPkg::Lock::Timeout=600 \
         -o Acquire::Retries=3 "$@" >>"$log" 2>&1 </dev/null
 }
-echo "installing ${#missing[@]} packages (a minute or less): ${missing[*]}"
+echo "installing ${#missing[@]} packages (a minute or more, as the network is; what happens: tail $log): ${missing[*]}"
 updated=yes
 apt update || updated=no
 if ! apt install --no-install-recommends "${missing[@]}"; then

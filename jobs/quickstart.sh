@@ -14,7 +14,7 @@ if [ $# != 0 ]; then
     exit 2
 fi
 jobs/install.sh
-[ -x $kuzure ] || echo "building (about two minutes, once)"
+[ -x $kuzure ] || echo "building, once: some minutes (how far it is: tail -n 1 $PWD/build/release.log)"
 jobs/build.sh release kuzure
 
 force=()

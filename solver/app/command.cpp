@@ -15,12 +15,12 @@ void SceneArguments::add_to(CLI::App& app)
     app.add_flag("--force-step", force_step, "accept a fixed step above the stable limit");
 }
 
-Scene SceneArguments::read(const Comm& comm) const
+scene::Ready SceneArguments::read(const Comm& comm) const
 {
     std::string text;
     io::on_root(comm, [&] { text = io::read_scene_text(file); });
     text = comm.broadcast(text);
-    return io::parse_scene(text, file, sets, force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce);
+    return io::parse_ready_scene(text, file, sets, step_limit());
 }
 
 io::Path SceneArguments::results(const Scene& scene, const std::string& asked) const

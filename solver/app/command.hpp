@@ -24,7 +24,8 @@ struct SceneArguments {
     bool force_step = false;
     void add_to(CLI::App&);
     /// Collective: rank 0 reads the file, every rank parses. Throws BadInput on all ranks.
-    Scene read(const Comm&) const;
+    scene::Ready read(const Comm&) const;
+    scene::StepLimit step_limit() const { return force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce; }
     /// Where the results go: the directory asked for, or the scene's, or results/<scene file's name>.
     io::Path results(const Scene&, const std::string& asked) const;
 };

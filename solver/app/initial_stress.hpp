@@ -15,8 +15,7 @@ public:
         gravity_ = s.effects.gravity ? -s.effects.gravity->z : 0;
     }
 
-    /// Stress at a soil particle's initial position. Vertical: the column one spacing wide above it. Sideways: elastic
-    /// K0 = nu/(1 - nu), or, where that lies outside the cone, the K0 that lies on it.
+    /// Stress at a soil particle's initial position. Vertical: the column one spacing wide above it. Sideways: K0 times that.
     Stress operator()(Vector x, int soil) const
     {
         const double dx = scene_.space.spacing, half = 0.499999 * dx, top = filling_.soil_bounds().high.z;
@@ -30,13 +29,7 @@ public:
         // What the pore water carries is not the skeleton's; water standing above the soil weighs on both.
         load -= water_.at(x).value - water_.at({x.x, x.y, surface}).value;
         if (load <= 0) return {};
-        const Material& m = soils_[soil];
-        // K0 from K and G: nu/(1 - nu) = (3 K - 2 G)/(3 K + 4 G)
-        const double elastic = (3 * m.bulk - 2 * m.shear) / (3 * m.bulk + 4 * m.shear);
-        // on the cone: (1 - K)/sqrt3 = alpha (1 + 2 K) + k/load
-        const double root3 = std::sqrt(3.0);
-        const double yielding = (1 - root3 * (m.alpha + m.k / load)) / (1 + 2 * root3 * m.alpha);
-        const double sideways = -load * std::max(elastic, yielding);
+        const double sideways = -load * soils_[soil].sideways_at_rest(load);
         return {sideways, sideways, -load, 0, 0, 0};
     }
 

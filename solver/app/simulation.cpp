@@ -24,9 +24,11 @@ template <class T> Record<T> far_away()
 } // namespace
 
 Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
-    : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
+    : comm_(comm), scene_(scene), options_(std::move(options)),
+      filling_(options_.filling ? std::move(*options_.filling) : scene::Filling(scene)), model_(choose_model(scene, options_.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)), buffers_(Buffers<double>(scene.smoothing_length()))
+      domain_(comm, block_space(scene, filling_, comm.size(), options_.blocks_per_rank)),
+      buffers_(Buffers<double>(scene.smoothing_length()))
 {
     timers_.timed(Phase::Setup, [&] {
         prepare();
@@ -49,9 +51,10 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
 }
 
 Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
-    : comm_(comm), scene_(scene), options_(options), filling_(scene), model_(choose_model(scene, options.arithmetic)),
+    : comm_(comm), scene_(scene), options_(std::move(options)),
+      filling_(options_.filling ? std::move(*options_.filling) : scene::Filling(scene)), model_(choose_model(scene, options_.arithmetic)),
       columns_(Columns::of(scene, low_corner(filling_, scene))),
-      domain_(comm, block_space(scene, filling_, comm.size(), options.blocks_per_rank)), particles_(std::move(particles)),
+      domain_(comm, block_space(scene, filling_, comm.size(), options_.blocks_per_rank)), particles_(std::move(particles)),
       buffers_(Buffers<double>(scene.smoothing_length())), clock_(clock)
 {
     timers_.timed(Phase::Setup, [&] {
@@ -375,6 +378,7 @@ std::pair<std::string, std::string> Simulation::diagnosis() const
 void Simulation::blame(std::int64_t id, const std::string& what, const std::string& remedy)
 {
     const auto& p = particles_;
+    blamed_ = id;
     std::string text;
     int root = 0;
     for (Index i = 0; i < p.size(); ++i) {

@@ -24,6 +24,7 @@ struct RunOptions {
     /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say. Velocity, density and
     /// stress have half-step twins, which must be set alike.
     std::function<void(Particles&)> initial = {};
+    std::optional<scene::Filling> filling = {}; // of this very scene, where somebody made it already
 };
 
 /// What a rank wants to happen after a step; travels with the step's only reduction.
@@ -80,6 +81,8 @@ public:
     /// Collective. Back to the last state that the guard found good, to go on with half the step; only with time.retry.
     /// False, and nothing changed, if there is none or this trouble was met before.
     bool roll_back();
+    /// Id of the particle that the last NumbersFailed named; -1 before there was one.
+    std::int64_t blamed() const { return blamed_; }
 
     /// Collective: energies of now.
     Ledger ledger() const;
@@ -182,7 +185,8 @@ private:
         std::int64_t pairs, particle_steps;
     };
     std::optional<Good> good_; // for time.retry
-    double trouble_ = -1;      // s, when the last retried failure happened
+    std::int64_t blamed_ = -1;
+    double trouble_ = -1; // s, when the last retried failure happened
     Timers timers_;
 };
 

@@ -47,12 +47,14 @@ bool StatusLine::due(bool final) const
 
 std::string StatusLine::text(const Status& s, double end, double rate, double left)
 {
-    std::string out = fmt::format("t {:.4f}/{:g} s  step {}  dt {:.2e}  {:.3g} steps/s", s.time, end, s.step, s.dt, rate);
+    // What people ask first stands first: a narrow terminal shows no more.
+    std::string out = fmt::format("t {:.4f}/{:g} s", s.time, end);
     if (left >= 0) {
         const std::time_t at = std::time(nullptr) + std::llround(left);
         out += fmt::format("  {} left, ends {:%H:%M}", duration(left), fmt::localtime(at));
     }
     if (s.residual) out += fmt::format("  energy {:+.3f} %", 100 * *s.residual);
+    out += fmt::format("  {:.3g} steps/s  step {}  dt {:.2e}", rate, s.step, s.dt);
     if (s.heap) {
         out += fmt::format("  front x {:.2f}..{:.2f}", s.heap->min_x, s.heap->max_x);
         if (s.dimensions == 3) out += fmt::format(" y {:.2f}..{:.2f}", s.heap->min_y, s.heap->max_y);
@@ -80,11 +82,33 @@ void StatusLine::show(const Status& s, bool final)
         const int columns = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
         const int width = columns >= 140 ? 20 : 10, full = int(done * width);
         // Longer than the terminal is wide, it could not renew itself.
-        line.resize(std::min(line.size(), std::size_t(std::max(0, columns - width - 4))));
+        line = cut(line, std::size_t(std::max(0, columns - width - 4)));
         fmt::print("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'), line,
                    final ? "\n" : "");
+        standing_ = !final;
     }
     std::fflush(stdout);
+}
+
+std::string StatusLine::cut(const std::string& text, std::size_t columns)
+{
+    if (text.size() <= columns) return text;
+    const auto end = text.rfind("  ", columns);
+    return text.substr(0, end == text.npos ? columns : end);
+}
+
+void StatusLine::make_room()
+{
+    if (!standing_) return;
+    fmt::print("\r\x1b[K");
+    std::fflush(stdout);
+    standing_ = false;
+}
+
+StatusLine::~StatusLine()
+{
+    // What comes next, an error perhaps, begins on a line of its own.
+    if (standing_) std::fputc('\n', stdout), std::fflush(stdout);
 }
 
 } // namespace kuzure

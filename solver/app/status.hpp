@@ -25,14 +25,20 @@ public:
     /// True if something should be shown now. `final`: whatever the clock says.
     bool due(bool final) const;
     void show(const Status&, bool final);
+    /// Takes the bar away for a line of other words; the next show() brings it back.
+    void make_room();
+    StatusLine(const StatusLine&) = delete;
+    ~StatusLine();
 
     /// The words alone; rate in steps/s, left in s of wall time (negative: unknown).
     static std::string text(const Status&, double end, double rate, double left);
+    /// As many of the words as the columns hold, none of them cut.
+    static std::string cut(const std::string& text, std::size_t columns);
 
 private:
-    bool speaks_, bar_;
-    double end_, start_, last_; // s; wall clock
-    double time_;               // s, simulated, when last shown
+    bool speaks_, bar_, standing_ = false; // standing: the cursor is behind a bar
+    double end_, start_, last_;            // s; wall clock
+    double time_;                          // s, simulated, when last shown
     std::int64_t step_;
     double rate_ = 0, pace_ = 0; // steps/s, simulated s a wall s: of late
 };

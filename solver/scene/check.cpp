@@ -531,6 +531,13 @@ void resolve(Scene& scene)
 
 Issues check(const Scene& scene, StepLimit limit)
 {
+    Issues issues;
+    ready(scene, limit, issues);
+    return issues;
+}
+
+std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
+{
     Rules rules;
     check_space(scene, rules);
     check_soils(scene, rules);
@@ -540,19 +547,24 @@ Issues check(const Scene& scene, StepLimit limit)
     check_plausible(scene, rules);
     check_inside(scene, rules);
     // Filling asks for shapes that make sense.
-    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
-        for (auto& issue : Filling::problems(scene)) rules.issues.push_back(std::move(issue));
+    std::optional<Filling> filling;
     if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; })) {
-        const Filling filling(scene);
-        for (auto& judgement : judge(scene, filling))
+        Issues problems;
+        filling = Filling::of(scene, problems);
+        for (auto& issue : problems) rules.issues.push_back(std::move(issue));
+    }
+    if (filling) {
+        for (auto& judgement : judge(scene, *filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
-        const double height = filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing;
+        const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",
                           text("no column of soil is {:.4g} m high, all of it {:.4g} m: fronts in history.csv will be empty",
                                *scene.output.grain, height));
     }
-    return rules.issues;
+    issues = rules.issues;
+    if (!filling) return {};
+    return Ready{std::move(scene), std::move(rules.issues), std::move(*filling)};
 }
 
 double column_bytes(const Filling& filling)

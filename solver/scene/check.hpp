@@ -31,6 +31,15 @@ void resolve(Scene&);
 /// Every rule a resolved scene breaks: errors and warnings, filling included.
 Issues check(const Scene&, StepLimit = StepLimit::Enforce);
 
+/// A resolved scene without errors, what is doubtful about it, and the particles it starts with: made once, by its check.
+struct Ready {
+    Scene scene;
+    Issues warnings;
+    Filling filling;
+};
+/// Nothing where check() finds errors; all that it finds is in `issues`.
+std::optional<Ready> ready(Scene, StepLimit, Issues& issues);
+
 /// Bytes of the columns of all soil particles of a run: the fields of the store, without records and lists.
 double column_bytes(const Filling&);
 

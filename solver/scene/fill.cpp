@@ -305,7 +305,7 @@ bool Lattice::reaches_into(const Shape& other) const
     return false;
 }
 
-Issues Filling::problems(const Scene& scene)
+Filling::Survey Filling::survey(const Scene& scene)
 {
     struct Piece {
         std::string key;
@@ -351,25 +351,37 @@ Issues Filling::problems(const Scene& scene)
                                               b.key, a.key, boxes ? fmt::format(" by {:.6g} m", depth) : ""),
                                   a.key});
         }
-    return issues;
+    Survey all{std::move(issues), {}};
+    for (auto& p : pieces) all.lattices.push_back(std::move(p.lattice));
+    return all;
 }
 
-Filling::Filling(const Scene& scene) : n_bodies_(scene.bodies.size())
+Issues Filling::problems(const Scene& scene) { return survey(scene).issues; }
+
+std::optional<Filling> Filling::of(const Scene& scene, Issues& problems)
+{
+    Survey found = survey(scene);
+    problems = std::move(found.issues);
+    if (!problems.empty()) return {};
+    return Filling(scene, std::move(found));
+}
+
+Filling::Filling(const Scene& scene) : Filling(scene, survey(scene)) {}
+
+Filling::Filling(const Scene& scene, Survey found) : n_bodies_(scene.bodies.size())
 {
     std::string errors;
-    for (const auto& issue : problems(scene)) errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
+    for (const auto& issue : found.issues) errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
     if (!errors.empty()) throw BadInput(errors);
 
     first_id_ = {0};
-    const auto add = [&](const Shape& shape) {
-        lattices_.emplace_back(shape, scene.space.spacing, scene.dimensions);
+    for (auto& lattice : found.lattices) {
+        lattices_.push_back(std::move(*lattice));
         first_id_.push_back(first_id_.back() + lattices_.back().size());
         const Box& box = lattices_.back().bounds();
         bounds_ = lattices_.size() == 1 ? box : united(bounds_, box);
-    };
-    for (const auto& body : scene.bodies) add(body.shape);
-    soil_bounds_ = bounds_;
-    for (const auto& wall : scene.walls) add(wall.shape);
+        if (lattices_.size() == n_bodies_) soil_bounds_ = bounds_;
+    }
 }
 
 std::int64_t Filling::soil_count_in(const Box& region) const

@@ -113,6 +113,8 @@ public:
     explicit Filling(const Scene&);
     /// Boxes that do not hold whole particles, empty bodies, overlaps.
     static Issues problems(const Scene&);
+    /// The filling, or nothing and what problems() says.
+    static std::optional<Filling> of(const Scene&, Issues& problems);
 
     std::int64_t soil_count() const { return first_id_[n_bodies_]; }
     std::int64_t wall_count() const { return first_id_.back() - soil_count(); }
@@ -152,6 +154,12 @@ public:
     int wall_of(std::int64_t wall_id) const;
 
 private:
+    struct Survey {
+        Issues issues;
+        std::vector<std::optional<Lattice>> lattices; // bodies, then walls; nothing where a shape cannot be filled
+    };
+    static Survey survey(const Scene&);
+    Filling(const Scene&, Survey);
     std::size_t owner(std::int64_t id) const;
 
     std::size_t n_bodies_;

@@ -17,8 +17,7 @@ struct Material {
     double apex;        // Pa, largest trace I1: k/alpha or 3 p_t of the cut-off; infinite without friction and cut-off
     double cutoff;      // Pa, 3 p_t; infinite without
     double rod_speed;   // sqrt(E/rho), m/s
-    double at_rest;     // horizontal over vertical stress of level ground without cohesion: nu/(1 - nu), or where that lies
-                        // outside the cone, the ratio on it
+    double at_rest;     // sideways_at_rest() of ground so deep that cohesion does not count
     // What changes the cone during a run; where it does not, the residual values are the first ones.
     double residual_alpha, residual_k;
     double softening_slip = std::numeric_limits<double>::infinity(); // m
@@ -28,6 +27,15 @@ struct Material {
 
     /// True if cone or dilation change with strain or its rate.
     bool evolves() const { return std::isfinite(softening_slip) || std::isfinite(dilation_decay) || grain > 0; }
+
+    /// K0, horizontal over vertical stress of level ground at rest, under a vertical stress in Pa: nu/(1 - nu), or where that lies
+    /// outside the cone, the ratio on it.
+    double sideways_at_rest(double load) const
+    {
+        // nu/(1 - nu) = (3 K - 2 G)/(3 K + 4 G); on the cone (1 - K0)/sqrt3 = alpha (1 + 2 K0) + k/load
+        const double root3 = std::sqrt(3.0), elastic = (3 * bulk - 2 * shear) / (3 * bulk + 4 * shear);
+        return std::max(elastic, (1 - root3 * (alpha + k / load)) / (1 + 2 * root3 * alpha));
+    }
 
     /// Slope alpha of the cone through a friction (or dilation) angle in rad.
     static double slope(scene::Cone cone, double angle)
@@ -76,9 +84,7 @@ struct Material {
         m.cutoff = soil.tension_cutoff ? 3 * *soil.tension_cutoff : std::numeric_limits<double>::infinity();
         m.apex = std::min(m.apex, m.cutoff);
         m.rod_speed = std::sqrt(soil.young / m.density);
-        // (1 - K)/sqrt3 = alpha (1 + 2 K) on the cone
-        const double root3 = std::sqrt(3.0);
-        m.at_rest = std::max(soil.poisson / (1 - soil.poisson), (1 - root3 * m.alpha) / (1 + 2 * root3 * m.alpha));
+        m.at_rest = m.sideways_at_rest(std::numeric_limits<double>::infinity());
         m.residual_alpha = m.alpha, m.residual_k = m.k;
         if (const auto& s = soil.softening) {
             m.residual_alpha = slope(soil.cone, s->friction_angle);

@@ -139,7 +139,9 @@ try:
     progress = open(work + "/done/progress.csv").read().splitlines()
     check(progress[0] == "time,step,dt,wall,steps_per_second,balance" and len(progress) > 50, "progress.csv has its rows")
     run("run", "s.toml", "-o", "failed", "--quiet", "--force-step", "--set", "time.step=8e-3", "--set", "time.end=8.0", expect=3)
-    page("failed", "the numbers broke (exit code 3)", "failed")
+    p, text = page("failed", "the numbers broke (exit code 3)", "failed")
+    check("the moment of failure" in p.text and "the last picture before it" in p.text and text.count("data:image/png") == 3,
+          "a failed run shows its moment and the last picture before it")
     run("run", "s.toml", "-o", "stopped", "--quiet", "--set", "time.end=50", "--max-minutes", "0.05", expect=5)
     p, _ = page("stopped", "Stopped on request", "stopped")
     check("of 50 s" in p.text, "a stopped run says how far it came")

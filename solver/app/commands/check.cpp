@@ -64,9 +64,8 @@ void add_check(CLI::App& app, Action& chosen)
         ->check(CLI::Range(1, 1000000000));
     command->callback([=, &chosen] {
         chosen = [=](const Comm& comm) {
-            const Scene s = args->read(comm);
+            const auto [s, doubts, filling] = args->read(comm);
             if (!accuracy->empty()) return turn_the_dial(comm, s, *accuracy, *json);
-            const scene::Filling filling(s);
             const auto model = choose_model(s, Arithmetic::Lanes);
             const Estimate e = estimate(s, filling, *model);
             const double memory = e.memory + bytes_per_process * comm.size();
@@ -85,8 +84,7 @@ void add_check(CLI::App& app, Action& chosen)
                 time = forecast(comm, s, filling, e);
             }
             std::vector<std::string> warnings;
-            for (const auto& issue : scene::check(s, args->force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
-                warnings.push_back(issue.key + ": " + issue.text);
+            for (const auto& issue : doubts) warnings.push_back(issue.key + ": " + issue.text);
             const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
             if (const auto why = machine->empty() ? does_not_fit(comm, e, where) : std::string(); !why.empty())
                 warnings.push_back("on this machine kuzure run would refuse this scene: " + why);

@@ -58,7 +58,8 @@ std::string job_name(const io::Path& scene)
 std::string clock_text(int seconds) { return fmt::format("{:02d}:{:02d}:{:02d}", seconds / 3600, seconds / 60 % 60, seconds % 60); }
 std::string duration_text(double seconds)
 {
-    return seconds < 120    ? fmt::format("{:.0f} s", seconds)
+    return seconds < 10     ? fmt::format("{:.2g} s", seconds)
+           : seconds < 120  ? fmt::format("{:.0f} s", seconds)
            : seconds < 7200 ? fmt::format("{:.0f} minutes", seconds / 60)
            : seconds < 2e5  ? fmt::format("{:.1f} hours", seconds / 3600)
                             : fmt::format("{:.1f} days", seconds / 86400);
@@ -127,7 +128,7 @@ void choose_mode_and_queue(Plan& p, const Arguments& a)
 Plan make_plan(const Comm& comm, const Arguments& a)
 {
     Plan p;
-    const Scene scene = a.scene.read(comm);
+    const auto [scene, doubts, filling] = a.scene.read(comm);
     p.machine = machine_named(a.machine);
     const auto& m = p.machine;
     p.nodes = a.nodes, p.per_node = a.ranks_per_node > 0 ? a.ranks_per_node : m.node.ranks;
@@ -139,7 +140,6 @@ Plan make_plan(const Comm& comm, const Arguments& a)
                                    m.file.string()));
     choose_mode_and_queue(p, a);
 
-    const scene::Filling filling(scene);
     p.estimate = estimate(scene, filling, *choose_model(scene, Arithmetic::Lanes));
     const Estimate& e = p.estimate;
     p.memory = e.memory / p.nodes + bytes_per_process * p.per_node;

@@ -111,9 +111,10 @@ public:
     }
 
 private:
-    Run(const Comm& comm, const Arguments& a, Scene scene, bool twin = false)
-        : comm_(comm), args_(a), twin_(twin), start_(now()), threads_(use_threads(comm, a.threads)), scene_(std::move(scene)),
-          hash_(io::scene_hash(scene_)), speaks_(comm.rank() == 0 && !a.quiet)
+    Run(const Comm& comm, const Arguments& a, scene::Ready ready, bool twin = false)
+        : comm_(comm), args_(a), twin_(twin), start_(now()), threads_(use_threads(comm, a.threads)), scene_(std::move(ready.scene)),
+          doubts_(std::move(ready.warnings)), filling_(std::move(ready.filling)), hash_(io::scene_hash(scene_)),
+          speaks_(comm.rank() == 0 && !a.quiet)
     {
     }
 
@@ -141,7 +142,8 @@ private:
                     Arguments a = args_;
                     a.output = t.directory.string(), a.twins = false, a.quiet = true, a.restart.reset(), a.force = true;
                     say(fmt::format("twin of {} times the spacing, in {}", factor, t.directory.string()));
-                    Run(comm_, a, t.twin.scene, true).go();
+                    scene::Issues issues; // coarsened() threw where one is an error
+                    Run(comm_, a, scene::ready(t.twin.scene, scene::StepLimit::Force, issues).value(), true).go();
                 }
             } catch (const BadInput& e) {
                 t.failed = e.what();
@@ -153,8 +155,9 @@ private:
         }
     }
 
-    void say(const std::string& text) const
+    void say(const std::string& text)
     {
+        if (status_) status_->make_room();
         if (speaks_) fmt::print("{}\n", text), std::fflush(stdout);
     }
 
@@ -166,8 +169,7 @@ private:
 
     void open()
     {
-        for (const auto& issue : scene::check(scene_, args_.scene.force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce))
-            warn(issue.key + ": " + issue.text);
+        for (const auto& issue : doubts_) warn(issue.key + ": " + issue.text);
         const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
         if (args_.restart) {
@@ -176,14 +178,12 @@ private:
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
         if (from) require_same_scene(*from, hash_);
-        const RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
+        RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
         const double done = from ? std::clamp(clock_from(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
-        {
-            const scene::Filling filling(scene_);
-            const Estimate e = estimate(scene_, filling, *choose_model(scene_, options.arithmetic));
-            fits_or_throw(e, where, done);
-            forecast_ = forecast(comm_, scene_, filling, e, done);
-        }
+        const Estimate e = estimate(scene_, *filling_, *choose_model(scene_, options.arithmetic));
+        fits_or_throw(e, where, done);
+        forecast_ = forecast(comm_, scene_, *filling_, e, done);
+        options.filling = std::exchange(filling_, std::nullopt);
         std::optional<double> restart_time;
         if (from) {
             Particles p;
@@ -191,12 +191,12 @@ private:
             const Clock clock = clock_from(from->header, from->file);
             restart_time = clock.time;
             dir_.emplace(comm_, where, io::Existing::GoOn);
-            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, options);
+            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
         } else {
             dir_.emplace(comm_, where, args_.force || args_.restart ? io::Existing::MoveAside : io::Existing::Refuse);
             if (!dir_->moved_to().empty()) say(fmt::format("the old results are now in {}", dir_->moved_to().string()));
-            sim_ = std::make_unique<Simulation>(comm_, scene_, options);
+            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options));
         }
         io::on_root(comm_, [&] {
             char host[256] = "";
@@ -211,7 +211,7 @@ private:
         snapshots_.emplace(comm_, dir_->snapshots(), restart_time);
         history_.emplace(comm_, dir_->history(), scene_.dimensions, restart_time);
         progress_.emplace(comm_, dir_->progress(), restart_time);
-        say(fmt::format("{}: {} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title, sim_->filling().soil_count(),
+        say(fmt::format("{}\n{} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title, sim_->filling().soil_count(),
                         sim_->filling().wall_count(), comm_.size(), threads_, sim_->model().name()));
         say(fmt::format("predicted: {}", forecast_text(forecast_)));
     }
@@ -277,17 +277,43 @@ private:
 
     void write_picture(int number)
     {
-        const auto extent = io::soil_extent(comm_, sim_->particles());
+        frame_ = io::soil_extent(comm_, sim_->particles());
+        write_picture(number, *frame_, {});
+    }
+
+    void write_picture(int number, const io::Extent& frame, std::optional<Vector> mark)
+    {
         io::PictureLabel label;
-        label.look = *scene_.output.picture;
+        label.look = scene_.output.picture.value_or(scene::Picture{});
         label.dimensions = scene_.dimensions;
-        label.low = extent.low, label.high = extent.high;
+        label.low = frame.low, label.high = frame.high;
+        label.mark = mark;
         label.spacing = scene_.space.spacing;
         label.title = scene_.title;
         label.time = sim_->time();
         const auto& start = sim_->filling().soil_bounds();
         label.middle_y = 0.5 * (start.low.y + start.high.y);
         io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
+    }
+
+    /// Snapshot and picture of a state whose numbers failed, framed like the last good one: what broke may be anywhere.
+    void keep_moment_of_failure()
+    {
+        const auto& p = sim_->particles();
+        if (!snapshots_->last_time() || sim_->time() > *snapshots_->last_time())
+            snapshots_->write(p, walls_, {sim_->time(), sim_->steps(), scene_.dimensions, scene_.title, scene_.output.fields});
+        double at[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+        for (Index i = 0; i < p.size(); ++i)
+            if (p[field::id][i] == sim_->blamed())
+                for (int c = 0; c < 3; ++c) at[c] = p[field::position].column[c][i];
+        comm_.max(std::span<double>(at));
+        const auto& start = sim_->filling().soil_bounds();
+        write_picture(snapshots_->count() - 1, frame_.value_or(io::Extent{start.low, start.high}), Vector{at[0], at[1], at[2]});
+    }
+
+    std::string last_good_checkpoint() const
+    {
+        return checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
     }
 
     void write_checkpoint()
@@ -368,14 +394,14 @@ private:
     }
 
     /// What a run took against what was said before, and where its report is.
-    void say_end(const std::string& how) const
+    void say_end(const std::string& how)
     {
         const double took = now() - start_;
         say(how);
         if (forecast_.seconds > 0)
             say(fmt::format("took {:.1f} s, predicted {:.1f} s ({:+.0f} %)", took, forecast_.seconds,
                             100 * (forecast_.seconds / took - 1)));
-        say(fmt::format("report: {}", (dir_->path() / "report.html").string()));
+        say(fmt::format("results in {}, to begin with report.html", dir_->path().string()));
     }
 
     Wishes wishes()
@@ -419,12 +445,12 @@ private:
     {
         std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
         Simulation& sim = *sim_;
-        StatusLine status(speaks_, scene_.time.end, sim.time(), sim.steps());
+        status_.emplace(speaks_, scene_.time.end, sim.time(), sim.steps());
         const auto look = [&](bool final) {
-            if (!status.due(final)) return;
-            status.show({sim.time(), sim.steps(), sim.dt(), sim.max_speed(), residual_, heap_, scene_.dimensions, comm_.size(),
-                         sim.structure().imbalance},
-                        final);
+            if (!status_->due(final)) return;
+            status_->show({sim.time(), sim.steps(), sim.dt(), sim.max_speed(), residual_, heap_, scene_.dimensions, comm_.size(),
+                           sim.structure().imbalance},
+                          final);
         };
         first_step_ = logged_step_ = sim.steps();
         logged_wall_ = now() - start_;
@@ -438,7 +464,7 @@ private:
                 loop_seconds_ = now() - begin;
                 peak_speed_ = std::max(peak_speed_, sim.max_speed());
                 outputs(before, sim.finished());
-                look(false);
+                if (!sim.finished()) look(false);
                 if (w.stop && !sim.finished()) {
                     write_checkpoint();
                     look(true);
@@ -456,28 +482,26 @@ private:
             look(true);
             std::string text = e.what();
             try {
-                snapshots_->write(sim.particles(), walls_,
-                                  {sim.time(), sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
+                keep_moment_of_failure();
                 text += fmt::format(". The moment is in the last snapshot of {}", dir_->snapshots().string());
-                text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
+                text += last_good_checkpoint();
                 write_summary("numbers failed", Exit::NumbersFailed, text);
                 write_report();
             } catch (const IoFailed& io) {
                 text += fmt::format(". It could not be saved: {}", io.what());
             }
             throw NumbersFailed(text);
+        } catch (const io::CheckpointFailed&) {
+            throw; // says itself which one is good
         } catch (const IoFailed& e) {
-            std::string text = e.what(); // a checkpoint that failed says itself which one is good
-            if (text.find("The last good checkpoint is") == text.npos)
-                text += checkpoint_.empty() ? ". No checkpoint had been written" : ". The last good checkpoint is " + checkpoint_.string();
-            throw IoFailed(text);
+            throw IoFailed(e.what() + last_good_checkpoint());
         }
         look(true);
         write_summary("finished", Exit::Ok);
         write_report();
-        say_end(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {}; results in {}", sim.steps() - first_step_,
-                            loop_seconds_, 1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)),
-                            residual_ ? fmt::format("{:+.2e}", *residual_) : "unknown", dir_->path().string()));
+        say_end(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {}", sim.steps() - first_step_, loop_seconds_,
+                            1e3 * loop_seconds_ / std::max<double>(1, double(sim.steps() - first_step_)),
+                            residual_ ? fmt::format("{:+.2e}", *residual_) : "unknown"));
         return Exit::Ok;
     }
 
@@ -487,8 +511,11 @@ private:
     double start_;
     int threads_;
     Scene scene_;
+    scene::Issues doubts_;
+    std::optional<scene::Filling> filling_; // until the simulation has it
     std::string hash_;
     bool speaks_;
+    std::optional<StatusLine> status_;
     std::optional<io::ResultDirectory> dir_;
     std::unique_ptr<Simulation> sim_;
     io::WallPoints walls_;
@@ -499,6 +526,7 @@ private:
     double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, logged_wall_ = 0;
     std::optional<double> residual_; // of the last row of the history
     std::optional<Heap> heap_;
+    std::optional<io::Extent> frame_; // of the last regular picture
     Forecast forecast_;
     std::vector<std::string> warnings_;
     bool stop_file_ = false;
@@ -532,6 +560,7 @@ void add_run(CLI::App& app, Action& chosen)
     command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
     under_heading(*command, "Scene", {"--set", "--force-step"});
     under_heading(*command, "Results", {"--output", "--force", "--quiet"});
+    under_heading(*command, "How accurate", {"--twins"});
     under_heading(*command, "Start and stop", {"--restart", "--max-minutes"});
     under_heading(*command, "Machine", {"--threads", "--force-size"});
     command->callback([=, &chosen] {

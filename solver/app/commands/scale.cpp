@@ -139,9 +139,8 @@ Exit scale(const Comm& comm, const Arguments& a)
 {
     if (comm.size() > 1) throw BadInput("kuzure scale counts for any number of ranks on one: expected a start without mpirun");
     use_threads(comm, 0);
-    const Scene s = a.scene.read(comm);
+    const auto [s, doubts, filling] = a.scene.read(comm);
     io::MachineProfile machine = machine_named(a.machine);
-    const scene::Filling filling(s);
     const auto model = choose_model(s, Arithmetic::Lanes);
     const double bytes = double(row_bytes(*model)), reach = list_reach(s);
     const Estimate e = estimate(s, filling, *model);

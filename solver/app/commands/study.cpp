@@ -94,7 +94,9 @@ public:
                 say(fmt::format("{}: {}{}", head,
                                 p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds)
                                                  : fmt::format("exit {}: {}", p.exit_code, p.message),
-                                k + 1 < todo.size() ? fmt::format("; about {:.1f} minutes left", left / 60) : ""));
+                                k + 1 < todo.size() ? left < 100 ? fmt::format("; about {:.0f} s left", left)
+                                                                 : fmt::format("; about {:.1f} minutes left", left / 60)
+                                                    : ""));
             }
             pairs_left -= p.predicted_pairs;
         }

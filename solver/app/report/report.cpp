@@ -175,16 +175,23 @@ std::string opening(const Record& r)
 std::string pictures(const Record& r)
 {
     if (r.pictures.empty()) return "<p class=\"soft\">None: the scene has no <code>picture</code> in [output].</p>\n";
-    std::vector<std::size_t> show{0, (r.pictures.size() - 1) / 2, r.pictures.size() - 1};
+    const std::size_t end = r.pictures.size() - 1;
+    const bool failed = r.text("status") == "numbers failed";
+    std::vector<std::size_t> show{0, end / 2, end};
+    if (failed) show = {0, end - std::min<std::size_t>(end, 1), end};
     show.erase(std::unique(show.begin(), show.end()), show.end());
     std::string s = "<div class=\"pictures\">\n";
-    for (std::size_t k = 0; k < show.size(); ++k) {
-        const double t = r.picture_times[show[k]];
-        const char* which = k == 0 ? "start" : k + 1 == show.size() ? "end" : "during";
+    for (const std::size_t k : show) {
+        const double t = r.picture_times[k];
+        const char* which = failed && k == end       ? "the moment of failure, the particle named above in the red ring"
+                            : k == 0                 ? "start"
+                            : failed && k + 1 == end ? "the last picture before it"
+                            : k == end               ? "end"
+                                                     : "during";
         const std::string caption = std::isfinite(t) ? fmt::format("{}, t = {:.4g} s", which, t) : which;
         try {
             s += fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
-                             data_uri("image/png", io::read_text(r.pictures[show[k]])));
+                             data_uri("image/png", io::read_text(r.pictures[k])));
         } catch (const IoFailed& e) {
             s += "<p>" + escaped(e.what()) + "</p>";
         }

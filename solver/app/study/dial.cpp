@@ -187,7 +187,10 @@ std::string to_text(const Proposal& p, double wanted)
     out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.scene.space.spacing, p.preset);
     out += fmt::format("  expected error {:.2g} %; over all measured scenes {:.2g} to {:.2g} %\n", 100 * p.expected, 100 * p.low,
                        100 * p.high);
-    out += fmt::format("  time           about {:.3g} minutes on this machine\n", p.cost / 60);
+    const auto [of, unit] = p.cost < 100    ? std::pair{1.0, "seconds"}
+                            : p.cost < 6000 ? std::pair{60.0, "minutes"}
+                                            : std::pair{3600.0, "hours"};
+    out += fmt::format("  time           about {:.3g} {} on this machine\n", p.cost / of, unit);
     out += fmt::format("  rests on       \"{}\"{}\n", p.nearest,
                        p.distance < 0.1
                            ? std::string(", a scene like this one")
