@@ -388,7 +388,8 @@ void write_picture(const Team& team, const Path& file, const Particles& p, const
         const bool above_floor = w.z > label.low.z - 0.25 * d;
         if (!flat && above_floor && w.y < label.low.y) seen = false;
         if (!flat && !side && above_floor && w.x > label.high.x) seen = false;
-        if (seen) add(w, wall_brown);
+        // Nor may a high wall stand behind the title.
+        if (seen && camera.y(w) > fine * 75.0) add(w, wall_brown);
     }
     double near_far[2] = {HUGE_VAL, HUGE_VAL}; // least depth, least of -depth
     for (const Splat& s : splats) {

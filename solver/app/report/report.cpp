@@ -149,7 +149,7 @@ std::string opening(const Record& r)
     // What was predicted is the whole run.
     std::string before = predicted > 0 ? "predicted " + duration(predicted) : "";
     if (predicted > 0 && wall > 0)
-        before += r.text("status") == "finished" ? fmt::format(" ({:+.0f} %)", 100 * (predicted / wall - 1)) : " for all of it";
+        before += r.text("status") == "finished" ? fmt::format(" ({:+.0f}\u00a0%)", 100 * (predicted / wall - 1)) : " for all of it";
     s += card("wall time", duration(wall), before);
     s += card("soil particles", grouped(r.number("soil_particles")), grouped(r.number("wall_particles")) + " of walls");
     s += card("ranks \u00d7 threads", grouped(r.number("ranks")) + " \u00d7 " + grouped(r.number("threads")), r.text("precision"));
