@@ -10,9 +10,11 @@ struct Point {
 Point operator-(Point a, Point b) { return {a.x - b.x, a.z - b.z}; }
 double cross(Point a, Point b) { return a.x * b.z - a.z * b.x; }
 double dot(Point a, Point b) { return a.x * b.x + a.z * b.z; }
+/// The k-th corner, k less than twice their number: a division here would be most of the time of filling a polygon.
 Point corner(const Polygon& p, std::size_t k)
 {
-    const auto& q = p.points[k % p.points.size()];
+    const std::size_t n = p.points.size();
+    const auto& q = p.points[k < n ? k : k - n];
     return {q[0], q[1]};
 }
 
