@@ -247,8 +247,8 @@ TEST(Fill, GiganticShapesAreCountedOrRefusedAtOnce)
     // Each of them could be held.
     std::vector<Shape> row;
     for (int k = 0; k < 50; ++k) row.push_back(Sphere{{300.0 * k, 0, 0}, 100});
-    EXPECT_EQ(problem(made(0.1, row)), "body.5.sphere: expected shapes that a computer can hold together, found 2.4e+07 rows of particles up "
-                                       "to this one at a spacing of 0.1 m; is space.spacing in metres?");
+    EXPECT_EQ(problem(made(0.1, row)), "body.5.sphere: expected shapes that a computer can hold together, found 2.4e+07 rows of particles "
+                                       "up to this one at a spacing of 0.1 m; is space.spacing in metres?");
     Polygon saw{{{0, 0}}, {0, 1}};
     for (int k = 0; k < 4000; ++k) saw.points.push_back({1 + 0.001 * k, k % 2 ? 100.0 : 1.0});
     EXPECT_EQ(problem(made(0.1, {saw})), "body.0.polygon: expected a polygon that can be filled in a minute, found 4001 corners and "
