@@ -3,9 +3,6 @@
 #include "solver/app/command_line.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#if defined(KUZURE_TRAP_FPE)
-#include <cfenv>
-#endif
 
 using namespace kuzure;
 
@@ -41,9 +38,6 @@ int main(int argc, char** argv)
     add_scale(app, chosen);
     add_completion(app, chosen);
     app.footer(help_footer); // last: commands added after it would show it too
-#if defined(KUZURE_TRAP_FPE)
-    feenableexcept(FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW);
-#endif
     Environment mpi(argc, argv);
     const Comm& comm = Comm::world();
     const bool speaks = comm.rank() == 0;

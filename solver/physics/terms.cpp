@@ -16,8 +16,10 @@ Stress tension(const Stress& s, double epsilon)
     for (int sweep = 0; sweep < 8; ++sweep)
         for (int p = 0; p < 2; ++p)
             for (int q = p + 1; q < 3; ++q) {
-                if (a[p][q] == 0) continue;
-                const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+                // Above 1e154 the angle is none, and the square of its cotangent no number.
+                const double apart = a[q][q] - a[p][p];
+                if (a[p][q] == 0 || std::fabs(apart) > 1.3e154 * (2 * std::fabs(a[p][q]))) continue;
+                const double theta = apart / (2 * a[p][q]);
                 const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
                 const double c = 1 / std::sqrt(t * t + 1), sn = t * c;
                 for (int k = 0; k < 3; ++k) {

@@ -35,6 +35,8 @@ public:
     Lattice(const Shape&, double spacing, int dimensions);
     /// Why the shape cannot be filled with whole lattice points, or empty.
     static std::string problem(const Shape&, double spacing, int dimensions);
+    /// At most so many rows along x are kept for a shape.
+    static double rows(const Shape&, double spacing, int dimensions);
 
     std::int64_t size() const { return size_; }
     Vector position(std::int64_t local) const;

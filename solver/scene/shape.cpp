@@ -10,9 +10,11 @@ struct Point {
 Point operator-(Point a, Point b) { return {a.x - b.x, a.z - b.z}; }
 double cross(Point a, Point b) { return a.x * b.z - a.z * b.x; }
 double dot(Point a, Point b) { return a.x * b.x + a.z * b.z; }
+/// The k-th corner, k less than twice their number: a division here would be most of the time of filling a polygon.
 Point corner(const Polygon& p, std::size_t k)
 {
-    const auto& q = p.points[k % p.points.size()];
+    const std::size_t n = p.points.size();
+    const auto& q = p.points[k < n ? k : k - n];
     return {q[0], q[1]};
 }
 
@@ -50,13 +52,13 @@ Contact contact_in_plane(const Polygon& polygon, Point x)
     }
     // A corner is closest: the normal points from it to the point outside or, on the corner, between its
     // edges.
-    const std::size_t k = where > 0 ? (edge + 1) % n : edge;
+    const std::size_t k = where <= 0 ? edge : edge + 1 < n ? edge + 1 : 0;
     const Point d = x - corner(polygon, k);
     const double l = std::hypot(d.x, d.z);
     const double sign = encloses(polygon, x) ? -1 : 1;
     const Point e = corner(polygon, k + 1) - corner(polygon, k);
     if (l > 1e-12 * std::hypot(e.x, e.z)) return {sign * l, {sign * d.x / l, 0, sign * d.z / l}};
-    const Point before = outward((k + n - 1) % n), after = outward(k), sum{before.x + after.x, before.z + after.z};
+    const Point before = outward(k > 0 ? k - 1 : n - 1), after = outward(k), sum{before.x + after.x, before.z + after.z};
     const double s = std::hypot(sum.x, sum.z);
     return {0, s > 1e-12 ? Vector{sum.x / s, 0, sum.z / s} : Vector{after.x, 0, after.z}};
 }

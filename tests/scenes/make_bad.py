@@ -342,6 +342,8 @@ CASES = {
     "second_soil_misspelt": ([("[[body]]", "[soil.clay]\ndensity = 1700.0\nyoung = 5e6\npoisson = 0.4\ncohesion = 2e4\n[[body]]\nsoil = \"caly\"\nbox = { low = [1.0, 0.0, 0.0], high = [2.0, 1.0, 1.0] }\n[[body]]")], r':20: body\.0\.soil: expected the name of a soil, found "caly"'),
     # gigantic
     "sphere_huge": (key("spacing = 0.1", "spacing = 1e-4") + shape("sphere = { center = [0.0, 0.0, 2e3], radius = 1e3 }"), r':16: body\.0\.sphere: expected a shape that a computer can hold, found 8e\+21 particles at a spacing of 0\.0001 m; is space\.spacing in metres\?'),
+    "spheres_huge_together": ([("spacing = 0.1", "spacing = 1e-3"), (BOX, "sphere = { center = [0.0, 0.0, 4.0], radius = 1.9 }"), ("[[wall]]", '[[body]]\nsoil = "sand"\nsphere = { center = [0.0, 0.0, 9.0], radius = 1.9 }\n[[wall]]')], r':19: body\.1\.sphere: expected shapes that a computer can hold together, found 2\.89e\+07 rows of particles up to this one at a spacing of 0\.001 m; is space\.spacing in metres\?'),
+    "polygon_along_a_row": ([FLAT] + shape("polygon = { points = [[0.0, 0.05], [9e8, 0.05], [9e8, 1.05]] }"), r':16: body\.0\.polygon: expected a polygon that can be filled in a minute, found 3 corners and 9e\+09 particles next to its edges at a spacing of 0\.1 m; leave out corners, or is space\.spacing in metres\?'),
     "wall_huge": ([("[-1.0, -1.0, -0.4], high = [2.0, 2.0, 0.0]", "[-1e8, -1e8, -0.4], high = [1e8, 1e8, 0.0]")], r':18: wall\.0\.box: expected a shape that a computer can hold, found 1\.6e\+19 particles at a spacing of 0\.1 m; is space\.spacing in metres\?'),
     "steps_without_number": (tim("step = 1e-13"), r':9: time\.step: expected fewer than 1e12 steps, found 1e\+13; is the step in seconds\?'),
 }

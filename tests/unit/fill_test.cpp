@@ -2,6 +2,7 @@
 #include "io/scene_file.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/fill.hpp"
+#include <ctime>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
@@ -206,6 +207,56 @@ TEST(Fill, LongAndThinShapesAreFilledByRows)
     const Lattice wedge(Polygon{{{1e6, 0}, {4, 0}, {4, 1}}, {0, 1}}, 0.1, 3), disc(Cylinder{{0, 0, 0}, 5e3, 0.2}, 0.1, 3);
     EXPECT_NEAR(double(wedge.size()), (1e6 - 4) / 2 * 1e3, 1e-6 * 5e8);
     EXPECT_NEAR(double(disc.size()), 3.14159265 * 5e3 * 5e3 * 0.2 * 1e3, 1e-5 * 1.6e10);
+}
+
+TEST(Fill, RoundShapesAreCountedExactly)
+{
+    // Centred on a lattice point, so that many points lie on the surface and do not count: whole numbers tell how many are inside.
+    const auto expected = [](std::int64_t r, int across) {
+        const auto inside = [r](std::int64_t rest) { // whole x with x^2 < rest
+            std::int64_t x = r;
+            while (x >= 0 && x * x >= rest) --x;
+            return x < 0 ? 0 : 2 * x + 1;
+        };
+        std::int64_t sum = 0;
+        for (std::int64_t a = -r; a <= r; ++a)
+            for (std::int64_t b = across == 2 ? -r : 0; b <= (across == 2 ? r : 0); ++b) sum += inside(r * r - a * a - b * b);
+        return sum;
+    };
+    for (const std::int64_t r : {1, 5, 13, 25, 65, 145})
+        for (const double dx : {0.1, 0.125, 1e-3}) {
+            const Vector c{(100 + 0.5) * dx, (-30 + 0.5) * dx, (7 + 0.5) * dx};
+            const Lattice ball(Sphere{c, double(r) * dx}, dx, 3), disc(Sphere{c, double(r) * dx}, dx, 2);
+            const Lattice rod(Cylinder{c - Vector{0, 0, dx / 2}, double(r) * dx, 3 * dx}, dx, 3);
+            EXPECT_EQ(ball.size(), expected(r, 2)) << r << " " << dx;
+            EXPECT_EQ(disc.size(), expected(r, 1)) << r << " " << dx;
+            EXPECT_EQ(rod.size(), 3 * expected(r, 1)) << r << " " << dx;
+        }
+}
+
+TEST(Fill, GiganticShapesAreCountedOrRefusedAtOnce)
+{
+    const std::clock_t start = std::clock();
+    // 809 million particles, none of which is looked at.
+    const Scene ball = made(0.1, {Sphere{{0, 0, 0}, 57.8}});
+    EXPECT_NEAR(double(Filling(ball).soil_count()), 4.18879 * 578 * 578 * 578, 1e4);
+    const auto problem = [](const Scene& scene) {
+        const Issues issues = Filling::problems(scene);
+        return issues.empty() ? std::string("accepted") : issues.front().key + ": " + issues.front().text;
+    };
+    // Each of them could be held.
+    std::vector<Shape> row;
+    for (int k = 0; k < 50; ++k) row.push_back(Sphere{{300.0 * k, 0, 0}, 100});
+    EXPECT_EQ(problem(made(0.1, row)), "body.5.sphere: expected shapes that a computer can hold together, found 2.4e+07 rows of particles "
+                                       "up to this one at a spacing of 0.1 m; is space.spacing in metres?");
+    Polygon saw{{{0, 0}}, {0, 1}};
+    for (int k = 0; k < 4000; ++k) saw.points.push_back({1 + 0.001 * k, k % 2 ? 100.0 : 1.0});
+    EXPECT_EQ(problem(made(0.1, {saw})), "body.0.polygon: expected a polygon that can be filled in a minute, found 4001 corners and "
+                                         "1.98e+07 particles next to its edges at a spacing of 0.1 m; leave out corners, or is "
+                                         "space.spacing in metres?");
+    // An edge on a row of particles, which are looked at one by one.
+    EXPECT_THAT(problem(made(0.1, {Polygon{{{0, 0.05}, {1e9, 0.05}, {1e9, 1}}, {}}}, {}, 2)), HasSubstr("can be filled in a minute"));
+    EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 5);
 }
 
 TEST(Fill, TouchingIsAllowedOverlappingIsNot)

@@ -43,6 +43,11 @@ double at(const Json& j, std::initializer_list<const char*> path)
     return here->is_number() ? here->get<double>() : std::nan("");
 }
 
+/// Of numbers that may not be there, which are no error: x > y, or no.
+bool more(double x, double y) { return std::isgreater(x, y); }
+/// a/b, or no number.
+double ratio(double a, double b) { return more(b, 0) ? a / b : std::nan(""); }
+
 /// Strings of an array, if it is one.
 std::vector<std::string> strings(const Json& j, const char* key)
 {
@@ -147,8 +152,8 @@ std::string opening(const Record& r)
     s += card("simulated", fmt::format("{} s", shown(std::isfinite(r.number("time")) ? r.number("time") : last(r.history, "time"))),
               grouped(std::isfinite(r.number("steps")) ? r.number("steps") : last(r.history, "step")) + " steps");
     // What was predicted is the whole run.
-    std::string before = predicted > 0 ? "predicted " + duration(predicted) : "";
-    if (predicted > 0 && wall > 0)
+    std::string before = more(predicted, 0) ? "predicted " + duration(predicted) : "";
+    if (more(predicted, 0) && more(wall, 0))
         before += r.text("status") == "finished" ? fmt::format(" ({:+.0f}\u00a0%)", 100 * (predicted / wall - 1)) : " for all of it";
     s += card("wall time", duration(wall), before);
     s += card("soil particles", grouped(r.number("soil_particles")), grouped(r.number("wall_particles")) + " of walls");
@@ -247,24 +252,24 @@ std::string phases(const Record& r)
 {
     if (!r.timers.contains("phases") || !r.timers["phases"].is_object())
         return "<p class=\"soft\">No times by phase were written: that is done at the end of a run.</p>\n";
-    const bool ranks = at(r.timers, {"ranks"}) > 1;
+    const bool ranks = more(at(r.timers, {"ranks"}), 1);
     std::string s = std::string("<div class=\"scroll\"><table><thead><tr><th>phase</th><th>share</th><th></th><th>mean s</th>") +
                     (ranks ? "<th>least s</th><th>most s</th>" : "") +
                     "<th>calls</th><th>Gflop/s</th><th>GB/s</th><th>flop/byte</th></tr></thead><tbody>\n";
     const auto row = [&](const std::string& name, const Json& p, const char* kind) {
-        const double share = at(p, {"share"}), gflops = at(p, {"gflop_per_second"}), gbytes = at(p, {"gbyte_per_second"}),
+        const double share = std::fmax(0, at(p, {"share"})), gflops = at(p, {"gflop_per_second"}), gbytes = at(p, {"gbyte_per_second"}),
                      intensity = at(p, {"flop_per_byte"});
         const auto or_nothing = [](double v) { return std::isfinite(v) ? shown(v) : std::string(); };
         s += fmt::format("<tr{}><td>{}</td><td>{:.1f} %</td><td class=\"bars\"><span class=\"bar\" style=\"width:{:.1f}%\"></span></td>"
                          "<td>{:.3f}</td>",
-                         kind, escaped(name), 100 * share, std::clamp(100 * share, 0.0, 100.0), at(p, {"seconds", "mean"}));
+                         kind, escaped(name), 100 * share, std::min(100 * share, 100.0), at(p, {"seconds", "mean"}));
         if (ranks) s += fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", at(p, {"seconds", "min"}), at(p, {"seconds", "max"}));
         s += fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                         at(p, {"calls"}) > 0 ? grouped(at(p, {"calls"})) : std::string(), or_nothing(gflops), or_nothing(gbytes),
+                         more(at(p, {"calls"}), 0) ? grouped(at(p, {"calls"})) : std::string(), or_nothing(gflops), or_nothing(gbytes),
                          or_nothing(intensity));
     };
     std::vector<std::pair<double, std::string>> order;
-    for (const auto& [name, p] : r.timers["phases"].items()) order.emplace_back(-at(p, {"share"}), name);
+    for (const auto& [name, p] : r.timers["phases"].items()) order.emplace_back(-std::fmax(0, at(p, {"share"})), name);
     std::sort(order.begin(), order.end());
     for (const auto& [share, name] : order) row(name, r.timers["phases"][name], "");
     if (r.timers.contains("total")) row("total", r.timers["total"], " class=\"sum\"");
@@ -273,7 +278,7 @@ std::string phases(const Record& r)
     s += fmt::format(
         "<p class=\"soft small\">{} directed pairs, {} a soil particle and step; {} ns a pair in the pair loop. The times are those of "
         "the last start of the program.</p>\n",
-        grouped(pairs), shown(pairs / steps), shown(1e9 * at(r.timers, {"pair_loop", "seconds", "max"}) / pairs));
+        grouped(pairs), shown(ratio(pairs, steps)), shown(ratio(1e9 * at(r.timers, {"pair_loop", "seconds", "max"}), pairs)));
     return s;
 }
 
@@ -282,14 +287,15 @@ std::string roofs(const Record& r)
     std::vector<Dot> dots;
     if (r.timers.contains("phases") && r.timers["phases"].is_object())
         for (const auto& [name, p] : r.timers["phases"].items())
-            if (const double x = at(p, {"flop_per_byte"}), y = at(p, {"gflop_per_second"}); x > 0 && y > 0) dots.push_back({name, x, y});
+            if (const double x = at(p, {"flop_per_byte"}), y = at(p, {"gflop_per_second"}); more(x, 0) && more(y, 0))
+                dots.push_back({name, x, y});
     if (dots.empty()) return "<p class=\"soft\">No phase has counted its operations.</p>\n";
     const bool single = r.text("precision") == "mixed";
     const double nodes = std::isfinite(r.number("hosts")) ? r.number("hosts") : 1;
     const double flops = nodes * at(r.timers, {"machine", single ? "gflops_float_all" : "gflops_double_all"}),
                  bytes = nodes * at(r.timers, {"machine", "gbytes_all"});
     std::optional<Roofs> machine;
-    if (flops > 0 && bytes > 0) machine = Roofs{flops, bytes, single ? "multiply-add, single" : "multiply-add, double"};
+    if (more(flops, 0) && more(bytes, 0)) machine = Roofs{flops, bytes, single ? "multiply-add, single" : "multiply-add, double"};
     std::string s = "<div class=\"pair\">\n" + roofline(machine ? &*machine : nullptr, dots) + "<div class=\"small soft\">";
     if (machine)
         s += fmt::format(
@@ -313,10 +319,10 @@ std::string balance(const Record& r)
     if (t.empty()) return "<p class=\"soft\">No progress.csv: nothing is known of the speed over time.</p>\n";
     std::string s = "<div class=\"pair\">\n" +
                     chart("Steps a second", "time", "s", t, "1/s", curves(r.progress, {{"steps_per_second", "steps a second"}}));
-    if (r.number("ranks") > 1)
+    if (more(r.number("ranks"), 1))
         s += chart("Balance: busiest rank over the mean", "time", "s", t, "1", curves(r.progress, {{"balance", "max/mean"}}), false);
     s += "</div>\n";
-    if (!(r.number("ranks") > 1)) s += "<p class=\"soft small\">One rank: there is nothing to balance.</p>\n";
+    if (!more(r.number("ranks"), 1)) s += "<p class=\"soft small\">One rank: there is nothing to balance.</p>\n";
     return s;
 }
 
@@ -380,8 +386,8 @@ void add_roofs(const io::Path& directory)
 {
     const Record r = read_record(directory);
     if (r.timers.empty() || r.timers.contains("machine") || r.text("host") != host_name()) return;
-    const double hosts = std::max(1.0, r.number("hosts")), threads = r.number("ranks") * r.number("threads") / hosts;
-    if (!(threads >= 1 && threads <= 65536)) return;
+    const double hosts = std::fmax(1, r.number("hosts")), threads = r.number("ranks") * r.number("threads") / hosts;
+    if (!std::isgreaterequal(threads, 1) || threads > 65536) return;
     auto timers = nlohmann::ordered_json::parse(io::read_text(directory / "timers.json"));
     timers["machine"] = nlohmann::ordered_json::parse(to_json(this_machine(instruction_set(), int(threads))));
     io::write_atomically(directory / "timers.json", timers.dump(2) + "\n");
