@@ -41,16 +41,6 @@ bool BlockSpace::raw_block(Vector x, Block& b) const
     return true;
 }
 
-Block BlockSpace::wrapped(Block b) const
-{
-    for (int a = 0; a < 3; ++a) {
-        if (!period_[a]) continue;
-        b[a] %= period_[a];
-        if (b[a] < 0) b[a] += period_[a];
-    }
-    return b;
-}
-
 Block BlockSpace::block_of(Vector x) const
 {
     Block b;

@@ -20,7 +20,7 @@ public:
     /// The same on one axis, for a coordinate that is near.
     std::int32_t raw_axis(int axis, double x) const { return std::int32_t(std::floor((x - origin_[axis]) / size_[axis])); }
     /// Wrapped to 0 .. n-1 on periodic axes.
-    Block wrapped(Block) const;
+    Block wrapped(Block b) const { return kuzure::wrapped(b, period_); }
     /// Both. Throws NumbersFailed where raw_block() gives nothing.
     Block block_of(Vector x) const;
     /// Corner of a block, m; that of the next one is its end.

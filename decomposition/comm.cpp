@@ -227,6 +227,20 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
     return in;
 }
 
+std::vector<double> Comm::tell(std::span<const int> peers, double mine) const
+{
+    std::vector<double> theirs(peers.size());
+    std::vector<MPI_Request> requests(2 * peers.size());
+    for (std::size_t k = 0; k < peers.size(); ++k) {
+        ensure(peers[k] >= 0 && peers[k] < size_ && peers[k] != rank_, "tell: a peer that is no other rank");
+        check(MPI_Irecv(&theirs[k], 1, MPI_DOUBLE, peers[k], mpi::Tell, handle_->comm, &requests[k]), "MPI_Irecv");
+    }
+    for (std::size_t k = 0; k < peers.size(); ++k)
+        check(MPI_Isend(&mine, 1, MPI_DOUBLE, peers[k], mpi::Tell, handle_->comm, &requests[peers.size() + k]), "MPI_Isend");
+    check(MPI_Waitall(int(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
+    return theirs;
+}
+
 NodePlace Comm::node_place() const
 {
     MPI_Comm shared = MPI_COMM_NULL;

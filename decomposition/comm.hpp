@@ -3,6 +3,7 @@
 // (MpiFailed). All calls belong to the main thread (MPI_THREAD_FUNNELED).
 #include "solver/core/ensure.hpp"
 #include "solver/core/team.hpp"
+#include <array>
 #include <cstring>
 #include <memory>
 #include <type_traits>
@@ -34,6 +35,28 @@ template <class T> struct Parcel {
     int rank;
     std::vector<T> items;
 };
+/// Items as bytes.
+template <class T> std::vector<Message> to_messages(std::span<const Parcel<T>> parcels)
+{
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<Message> bytes;
+    for (const auto& p : parcels) {
+        const auto b = std::as_bytes(std::span(p.items));
+        bytes.push_back({p.rank, {b.begin(), b.end()}});
+    }
+    return bytes;
+}
+/// And back.
+template <class T> std::vector<Parcel<T>> from_messages(const std::vector<Message>& messages)
+{
+    std::vector<Parcel<T>> in;
+    for (const Message& m : messages) {
+        ensure(m.bytes.size() % sizeof(T) == 0, "a typed message holds a fraction of an item");
+        in.push_back({m.rank, std::vector<T>(m.bytes.size() / sizeof(T))});
+        if (!m.bytes.empty()) std::memcpy(in.back().items.data(), m.bytes.data(), m.bytes.size());
+    }
+    return in;
+}
 /// Where this rank sits among those that share its memory; nodes are numbered by their lowest rank.
 struct NodePlace {
     int rank, size;
@@ -75,20 +98,11 @@ public:
     /// The same, typed.
     template <class T> std::vector<Parcel<T>> exchange(const std::vector<Parcel<T>>& out) const
     {
-        static_assert(std::is_trivially_copyable_v<T>);
-        std::vector<Message> bytes;
-        for (const auto& p : out) {
-            const auto b = std::as_bytes(std::span(p.items));
-            bytes.push_back({p.rank, {b.begin(), b.end()}});
-        }
-        std::vector<Parcel<T>> in;
-        for (const Message& m : exchange(std::move(bytes))) {
-            ensure(m.bytes.size() % sizeof(T) == 0, "a typed message holds a fraction of an item");
-            in.push_back({m.rank, std::vector<T>(m.bytes.size() / sizeof(T))});
-            if (!m.bytes.empty()) std::memcpy(in.back().items.data(), m.bytes.data(), m.bytes.size());
-        }
-        return in;
+        return from_messages<T>(exchange(to_messages(std::span(out))));
     }
+    /// The same number to each of some other ranks, which tell theirs in turn; what they tell, in their order. Not collective:
+    /// only those that name each other meet.
+    std::vector<double> tell(std::span<const int> peers, double mine) const;
     /// One value of each rank, by rank, on every rank.
     template <class T> std::vector<T> allgather(const T& mine) const
     {

@@ -46,39 +46,7 @@ void Domain::stop_if_lost(bool mine, Vector x) const
 int Domain::owner_of(const Block& asked) const
 {
     ensure(is_cut_, "a domain is asked for owners before it is cut");
-    if (block_.empty()) return 0;
-    const Block b = space_.wrapped(asked);
-    const auto& period = space_.period();
-    if (const int k = place_of(b); k >= 0) return owner_[k];
-
-    // (largest difference, squared distance, lexicographic place): the least wins.
-    using Rank = std::tuple<std::int64_t, std::int64_t, int>;
-    const auto rank_of = [&](int k) {
-        std::int64_t largest = 0, squared = 0;
-        for (int a = 0; a < 3; ++a) {
-            std::int64_t d = std::abs(std::int64_t(block_[k][a]) - b[a]);
-            if (period[a]) d = std::min(d, period[a] - d);
-            largest = std::max(largest, d);
-            squared += d * d;
-        }
-        return Rank(largest, squared, k);
-    };
-    const Rank none(std::numeric_limits<std::int64_t>::max(), 0, 0);
-    Rank best = none;
-    constexpr int shells = 3; // looked up one by one; further away, the whole list is faster
-    for (int s = 1; s <= shells && best == none; ++s)
-        for (int i = -s; i <= s; ++i)
-            for (int j = -s; j <= s; ++j)
-                for (int l = -s; l <= s; l += std::abs(i) == s || std::abs(j) == s ? 1 : 2 * s) {
-                    const Block near = space_.wrapped({b[0] + i, b[1] + j, b[2] + l});
-                    bool inside = true;
-                    for (const auto c : near) inside = inside && c >= -block_limit && c < block_limit;
-                    const int k = inside ? place_of(near) : -1;
-                    if (k >= 0) best = std::min(best, rank_of(k));
-                }
-    if (best == none)
-        for (int k = 0; k < int(block_.size()); ++k) best = std::min(best, rank_of(k));
-    return owner_[std::get<2>(best)];
+    return known_.owner_of(space_.wrapped(asked), space_.period());
 }
 
 // ---- cutting
@@ -124,8 +92,9 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
     std::span<const std::byte> from(result);
     if (const auto failure = take<char>(from); !failure.empty())
         throw Broken("the domain cannot be cut: " + std::string(failure.begin(), failure.end()));
-    block_ = take<Block>(from);
-    owner_ = take<int>(from);
+    auto blocks = take<Block>(from);
+    auto owners = take<int>(from);
+    known_ = {std::move(blocks), std::move(owners)};
     CutReport r;
     const auto numbers = take<double>(from);
     r.parts = int(numbers[0]);
@@ -140,6 +109,15 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
 
     is_cut_ = true;
     r.seconds = comm_.max(now() - start);
+    return r;
+}
+
+EvenReport Domain::even_out(std::span<const BlockWork> mine, HaloCost halo)
+{
+    ensure(is_cut_, "a domain is evened out before it is cut");
+    std::vector<BlockOwners> known{known_};
+    const auto r = kuzure::even_out(RunCrew(comm_), {{mine.begin(), mine.end()}}, space_.grid(halo.reach, halo.row_bytes), known);
+    known_ = std::move(known[0]);
     return r;
 }
 

@@ -3,6 +3,7 @@
 // agree on; a cut decides who computes a particle, never a bit of the result.
 #include "decomposition/block_space.hpp"
 #include "decomposition/comm.hpp"
+#include "decomposition/even_out.hpp"
 #include "decomposition/halo.hpp"
 #include "solver/core/particles.hpp"
 #include <string>
@@ -36,9 +37,16 @@ public:
     /// on every rank, its seconds the longest of all ranks.
     CutReport cut(std::span<const BlockWork> mine, Method = Method::Metis, HaloCost = {}, Labels = Labels::Kept);
 
-    /// The same on every rank, for any block: where no soil was at the last cut, the owner of the nearest
-    /// block that had some (largest difference of an axis, then distance, then lexicographic order). Throws
+    /// Later cuts: hands blocks from heavier ranks to lighter ones that touch them (even_out()); collective. `mine` lists
+    /// what the blocks of this rank's particles cost, whoever owns them. Particles are where migrate() leaves them. Throws
     /// Broken before cut().
+    EvenReport even_out(std::span<const BlockWork> mine, HaloCost = {});
+    /// After cut() and the migration that follows: keeps the owners of blocks up to two around this rank's own. From here
+    /// on nothing that a rank holds grows with the whole scene.
+    void forget_far() { known_.forget_far(comm_.rank(), space_.period()); }
+
+    /// Of any block: where no soil was at the last cut, the owner of the nearest block that had some (BlockOwners). The same
+    /// on every rank until forget_far(); from then on for blocks around this rank's own. Throws Broken before cut().
     int owner_of(const Block&) const;
     int owner_of(Vector x) const { return owner_of(block_of(x)); }
 
@@ -57,28 +65,23 @@ public:
     HaloPlan plan_halo(const Particles& p, double reach) const { return plan_halo(p[field::position], p.size(), reach); }
 
     const Comm& comm() const { return comm_; }
-    /// Blocks that held soil at the last cut, in lexicographic order, and their owners.
-    std::span<const Block> blocks() const { return block_; }
-    std::span<const int> owners() const { return owner_; }
+    /// Blocks that held soil at the last cut, in lexicographic order, and their owners: all, or those that this rank knows.
+    std::span<const Block> blocks() const { return known_.blocks(); }
+    std::span<const int> owners() const { return known_.owners(); }
+    /// What this rank knows of owners, to go back to when particles go back to where they were.
+    const BlockOwners& known() const { return known_; }
+    void know_again(BlockOwners earlier) { known_ = std::move(earlier); }
     /// Blocks per period by axis; 0 where open.
     const std::array<std::int32_t, 3>& period() const { return space_.period(); }
     const BlockSpace& space() const { return space_; }
 
 private:
-    /// Place of a wrapped block in block_, or -1. A search, not a table: of all that a rank keeps, only this list grows with
-    /// the whole scene.
-    int place_of(const Block& b) const
-    {
-        const auto at = std::ranges::lower_bound(block_, b);
-        return at != block_.end() && *at == b ? int(at - block_.begin()) : -1;
-    }
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 
     const Comm& comm_;
     BlockSpace space_;
-    std::vector<Block> block_;
-    std::vector<int> owner_;
+    BlockOwners known_;
     bool is_cut_ = false;
 };
 

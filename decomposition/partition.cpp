@@ -1,4 +1,5 @@
 #include "decomposition/partition.hpp"
+#include "decomposition/rim.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
@@ -13,16 +14,37 @@ const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curv
 
 // ---- the graph
 // -----------------------------------------------------------------------------------------------------
+void check_block(const BlockWork& b, const BlockGrid& grid)
+{
+    for (int a = 0; a < 3; ++a) {
+        ensure(b.block[a] >= -block_limit && b.block[a] < block_limit, "a block lies beyond the block limit");
+        ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]), "a block lies outside its period");
+    }
+    ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
+           "a block's work or particle count is negative or not a number");
+}
+
+void append_links(const BlockGraph& g, const BlockIndex& index, int b, std::vector<BlockGraph::Link>& to)
+{
+    for (int code = 0; code < 27; ++code) {
+        const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
+        if (code == 13) continue;
+        Block there = g.block[b];
+        double share = 1; // of a block's particles within reach of the other block
+        for (int a = 0; a < 3; ++a) {
+            there[a] += d[a];
+            if (d[a]) share *= std::min(1.0, g.grid.reach[a]);
+        }
+        there = wrapped(there, g.grid.period);
+        const bool inside = std::ranges::all_of(there, [](std::int32_t c) { return c >= -block_limit && c < block_limit; });
+        const int n = inside ? index[there] : -1;
+        if (n >= 0) to.push_back({n, d, share * g.grid.row_bytes * (g.particles[b] + g.particles[n])});
+    }
+}
+
 BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
 {
-    for (const auto& b : given) {
-        for (int a = 0; a < 3; ++a) {
-            ensure(b.block[a] >= -block_limit && b.block[a] < block_limit, "a block lies beyond the block limit");
-            ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]), "a block lies outside its period");
-        }
-        ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
-               "a block's work or particle count is negative or not a number");
-    }
+    for (const auto& b : given) check_block(b, grid);
     std::vector<BlockWork> all(given.begin(), given.end());
     std::ranges::stable_sort(all, {}, &BlockWork::block);
 
@@ -43,21 +65,7 @@ BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
     for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
     for (int b = 0; b < g.size(); ++b) {
         g.first.push_back(g.link.size());
-        for (int code = 0; code < 27; ++code) {
-            const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
-            if (code == 13) continue;
-            Block there = g.block[b];
-            double share = 1; // of a block's particles within reach of the other block
-            bool inside = true;
-            for (int a = 0; a < 3; ++a) {
-                there[a] += d[a];
-                if (grid.period[a]) there[a] = (there[a] + grid.period[a]) % grid.period[a];
-                inside = inside && there[a] >= -block_limit && there[a] < block_limit;
-                if (d[a]) share *= std::min(1.0, grid.reach[a]);
-            }
-            const int n = inside ? index[there] : -1;
-            if (n >= 0) g.link.push_back({n, d, share * grid.row_bytes * (g.particles[b] + g.particles[n])});
-        }
+        append_links(g, index, b, g.link);
     }
     g.first.push_back(g.link.size());
     return g;
@@ -352,7 +360,7 @@ void fill_empty_parts(const BlockGraph& g, Cut& part, int parts)
 
 /// Moves rim blocks from heavier to lighter neighbouring parts until the heaviest part is within `target` of
 /// the mean or nothing helps. Each move lowers the sum of squared loads, so it ends.
-void even_out(const BlockGraph& g, Cut& part, int parts, double target)
+void even_out_parts(const BlockGraph& g, Cut& part, int parts, double target)
 {
     Loads loads(g, part, parts);
     const double mean = std::accumulate(loads.work.begin(), loads.work.end(), 0.0) / parts;
@@ -370,21 +378,10 @@ void even_out(const BlockGraph& g, Cut& part, int parts, double target)
         for (const int p : order) {
             // One block per part and pass: the loads around it change, so look again before the next.
             if (loads.work[p] <= mean || loads.blocks[p] < 2) continue;
-            int best = -1, to = -1;
-            double most = 0;
-            for (const int b : members[p]) {
-                if (part[b] != p || g.work[b] <= 0) continue;
-                for (const auto& l : g.links(b)) ties[part[l.block]] += l.bytes;
-                for (const auto& l : g.links(b)) {
-                    const int q = part[l.block];
-                    if (q == p || !(loads.work[q] + g.work[b] < loads.work[p])) continue;
-                    const double gain = ties[q] - ties[p];
-                    if (best < 0 || gain > most) best = b, to = q, most = gain;
-                }
-                for (const auto& l : g.links(b)) ties[part[l.block]] = 0;
-            }
-            if (best < 0) continue;
-            loads.move(best, to);
+            const RimBlock best =
+                best_rim_block(g, part, p, members[p], ties, [&](int b, int q) { return loads.work[q] + g.work[b] < loads.work[p]; });
+            if (best.block < 0) continue;
+            loads.move(best.block, best.to);
             moved = true;
         }
         if (!moved) return;
@@ -429,9 +426,6 @@ void keep_labels(const BlockGraph& g, Cut& part, int parts, const std::vector<in
     for (int& p : part) p = label[p];
 }
 
-constexpr double good = 1.03; // imbalance below which only the halo counts
-constexpr double fair = 1.05; // imbalance that an evened out cut may keep
-
 Cut best_cut(const BlockGraph& g, int parts, Method method)
 {
     if (parts == 1) return Cut(g.size(), 0);
@@ -443,16 +437,18 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
     fill_empty_parts(g, best, parts);
     if (method == Method::Hilbert) return best;
 
-    even_out(g, best, parts, good);
+    even_out_parts(g, best, parts, good_balance);
     CutReport report = describe(g, best, parts);
     MetisGraph metis(g, parts);
     const auto consider = [&](Way way) {
         auto cut = metis_cut(metis, parts, way);
         if (!cut) return;
         fill_empty_parts(g, *cut, parts);
-        even_out(g, *cut, parts, good);
+        even_out_parts(g, *cut, parts, good_balance);
         const CutReport r = describe(g, *cut, parts);
-        if (std::pair(std::max(good, r.imbalance), r.cut_bytes) >= std::pair(std::max(good, report.imbalance), report.cut_bytes)) return;
+        if (std::pair(std::max(good_balance, r.imbalance), r.cut_bytes) >=
+            std::pair(std::max(good_balance, report.imbalance), report.cut_bytes))
+            return;
         best = std::move(*cut);
         report = r;
     };
@@ -465,20 +461,6 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
     return best;
 }
 
-/// A known cut, evened out, if that is good enough: METIS costs ten times as much, and moves far more. Nothing where it
-/// would send more than the Hilbert curve's, which a cut may come to by and by.
-std::optional<Cut> mended(const BlockGraph& g, int parts, const Cut& previous)
-{
-    if (!std::ranges::all_of(previous, [&](int p) { return p >= 0 && p < parts; })) return std::nullopt;
-    Cut part = previous;
-    fill_empty_parts(g, part, parts);
-    even_out(g, part, parts, good);
-    const CutReport r = describe(g, part, parts);
-    if (r.imbalance > (g.size() > large_graph ? fair : good)) return std::nullopt;
-    if (r.cut_bytes > describe(g, hilbert_cut(g, parts), parts).cut_bytes) return std::nullopt;
-    return part;
-}
-
 } // namespace
 
 std::vector<int> partition(const BlockGraph& g, int parts, Method method, const std::vector<int>* previous)
@@ -486,9 +468,6 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
     ensure(parts >= 1, "a cut has at least one part");
     ensure(!previous || int(previous->size()) == g.size(), "the previous cut has another number of blocks");
     if (g.size() == 0) return {};
-    if (previous && method == Method::Metis && parts < g.size()) {
-        if (auto cut = mended(g, parts, *previous)) return *cut;
-    }
     Cut part = best_cut(g, std::min(parts, g.size()), method);
     if (previous) keep_labels(g, part, parts, *previous);
     return part;

@@ -25,6 +25,17 @@ inline std::uint64_t key_of(const Block& b)
     return k;
 }
 
+/// A block's place within the periods (blocks by axis; 0: open).
+inline Block wrapped(Block b, const std::array<std::int32_t, 3>& period)
+{
+    for (int a = 0; a < 3; ++a) {
+        if (!period[a]) continue;
+        b[a] %= period[a];
+        if (b[a] < 0) b[a] += period[a];
+    }
+    return b;
+}
+
 /// From blocks to their place in a list.
 class BlockIndex {
 public:
@@ -78,8 +89,13 @@ struct BlockGraph {
 /// on a work or particle count that is negative or not finite, and on a block outside its period.
 BlockGraph block_graph(std::span<const BlockWork>, const BlockGrid& = {});
 
-/// From so many blocks on a cut by METIS takes too long to be repeated: a known cut is evened out instead.
-inline constexpr int large_graph = 200000;
+/// Throws Broken on a block that block_graph() refuses.
+void check_block(const BlockWork&, const BlockGrid&);
+/// Appends the links of block b to those of the graph's blocks that the index knows.
+void append_links(const BlockGraph&, const BlockIndex&, int b, std::vector<BlockGraph::Link>&);
+
+/// max/mean of work below which only the halo counts.
+inline constexpr double good_balance = 1.03;
 
 enum class Method { Metis, Hilbert };
 const char* name(Method);
@@ -102,7 +118,7 @@ CutReport describe(const BlockGraph&, std::span<const int> part, int parts);
 /// Part of each block, 0 .. parts-1; the same for the same input. No part is empty unless parts outnumber the
 /// blocks. `previous` (part of each block before, or -1) only permutes the labels, so that most work stays
 /// where it was. Metis: the best of several cuts by METIS 5, evened out; where none is better, the Hilbert
-/// curve's.
+/// curve's. Serial: for the start, a restart, and where even_out() leaves too much.
 std::vector<int> partition(const BlockGraph&, int parts, Method = Method::Metis, const std::vector<int>* previous = nullptr);
 
 /// A cut with what it was made from.

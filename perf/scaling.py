@@ -3,6 +3,7 @@
     perf/scaling.py weak      the paper's three cases on Oakforest-PACS: predicted efficiency and where it goes, for 1, 4, 32 ranks a node
     perf/scaling.py series    the same height, tiled sideways, up to 8,208 nodes: predicted efficiency, time and memory of the cut
     perf/scaling.py balance   max/mean of pair work from real cuts, at the start and, with --from DIR, later in hirata_52
+    perf/scaling.py drift     later cuts between neighbours: hirata_52 moved from its start to --from DIR in --steps N straight steps, on 64 imagined ranks
     perf/scaling.py model     the model against runs here on 1 and 2 ranks (needs a quiet machine)
     perf/scaling.py work      what a wall pair and a particle cost in units of a soil pair (needs a quiet machine)
     perf/scaling.py serial    time of each phase with 1 and 2 threads, and the serial share that they tell (needs a quiet machine)
@@ -120,6 +121,21 @@ def balance():
                         f"{case['messages_per_step'] / case['ranks']:.1f}", str(case["scattered_ranks"]), f"{case['cut_seconds']:.2f}"])
     keep("balance", rows)
     table(["scene", "ranks", "soil, most", "pairs max/mean", "ghosts per soil", "messages a rank", "scattered", "cut here, s"], out)
+
+
+def drift():
+    scene = os.path.join(args.state, "scene.toml")
+    done = subprocess.run([args.program, "scale", scene, "--ranks", str(args.ranks), "--from", args.state, "--recuts", str(args.steps)],
+                          check=True, capture_output=True, text=True)
+    cuts = json.loads(done.stdout)[0]["cuts"]
+    keep("drift", cuts)
+    every = max(1, len(cuts) // 10)
+    table(["cut", "max/mean before", "after", "blocks moved, %", "sweeps", "rounds", "scattered", "peers", "halo of it, MB", "busy, ms", "blocks known"],
+          [[str(k), f"{c['before']:.3f}", f"{c['after']:.3f}", f"{100 * c['moved_blocks'] / c['blocks']:.1f}", str(c["sweeps"]), str(c["rounds"]),
+            str(c["scattered"]), f"{c['peers_mean']:.1f}", f"{1e-6 * c['cut_bytes']:.1f}", f"{1e3 * c['busy_seconds']:.1f}", str(c["known_most"])]
+           for k, c in enumerate(cuts, 1) if k % every == 0])
+    last = cuts[-1]["whole"]
+    print(f"METIS at the end: {last['balance']:.3f}, {1e-6 * last['cut_bytes']:.1f} MB, {last['scattered']} scattered, {last['seconds']:.2f} s")
 
 
 def timed(ranks, threads, steps):
@@ -256,12 +272,13 @@ plot $s u 5:6 w lp lw 2 pt 7 t "seconds", "" u 5:7 w lp lw 2 pt 5 t "GB, of the 
 
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("figure", choices=("weak", "series", "balance", "model", "work", "serial", "plot"))
+parser.add_argument("figure", choices=("weak", "series", "balance", "drift", "model", "work", "serial", "plot"))
 parser.add_argument("--program", default=os.path.join(here, "build", "release", "kuzure"))
 parser.add_argument("--machine", default="oakforest-pacs")
 parser.add_argument("--nodes", type=int, default=8208, help="largest of the series")
 parser.add_argument("--from", dest="state", help="result directory of hirata_52")
 parser.add_argument("--steps", type=int, default=200)
+parser.add_argument("--ranks", type=int, default=64, help="of drift")
 parser.add_argument("--repeats", type=int, default=5)
 args = parser.parse_args()
 globals()[args.figure]()

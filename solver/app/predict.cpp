@@ -25,10 +25,14 @@ constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, places of 
 constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 constexpr double drift = 5e-5;           // growth of max/mean - 1 per step while soil slides
-constexpr double cut_seconds = 2.8e-6;   // METIS per block and halving of the parts, here
-constexpr double evening_seconds = 1e-5; // a re-cut on rank 0, per block: graph, evening out, looking at it twice; 216,000 blocks here
-constexpr double block_bytes = 48;       // of a block, its cost and its owner
-constexpr double scalar_ns_here = 59;    // particle_ns of the machine where the one above was measured
+// Of a cut between neighbours: measured by `perf/scaling.py drift`.
+constexpr double even_seconds = 4.2e-5; // processor time here per block of the mean rank, of the rank that computes longest
+constexpr double even_sweeps = 55;      // numbers told to all peers, each with a sum over all ranks
+constexpr double even_rounds = 10;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
+constexpr double even_moves = 0.065;    // particles that migrate, of a rank's
+constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which every rank gets
+constexpr double state_bytes = 252;     // of a particle that migrates
+constexpr double scalar_ns_here = 59;   // particle_ns of the machine where even_seconds was measured
 
 } // namespace
 
@@ -69,7 +73,18 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
                 steps_per_rebuild;
     // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
     // sqrt(2 C/(d t)) steps, and cut and idle time together cost 2 C of them.
-    const double cut = at.blocks * (evening_seconds * c.particle_ns / scalar_ns_here + 2 * block_bytes / bandwidth);
+    // The pairs of each block are counted from the lists first: no more work than making the lists.
+    double far = 0, most_particles = 0;
+    for (const RankLoad& r : ranks)
+        far = std::max(far, r.far_messages + 0.2 * (r.messages - r.far_messages)), most_particles = std::max(most_particles, r.particles);
+    const double everybody = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
+    const double cut = at.blocks == 0
+                           ? 0
+                           : at.blocks / at.ranks * even_seconds * c.particle_ns / scalar_ns_here +
+                                 most_particles * particle * steps_per_rebuild + even_sweeps * (far * latency + latency + everybody) +
+                                 even_rounds * (3 * (messages * latency + everybody) + 2 * everybody) +
+                                 double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + everybody +
+                                 even_moves * most_particles * state_bytes * at.ranks_per_node / bandwidth;
     if (cut > 0) {
         s.recut_steps = std::sqrt(2 * cut / (drift * s.total()));
         s.recut = 2 * cut / s.recut_steps;

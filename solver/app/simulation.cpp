@@ -76,7 +76,10 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
             domain_.migrate(particles_);
             rebuild(false);
         }
-        rebalance_ = Rebalance(report.imbalance, comm_.max(omp_get_wtime() - begin));
+        domain_.forget_far();
+        const double seconds = comm_.max(omp_get_wtime() - begin);
+        rebalance_ = Rebalance(report.imbalance, seconds);
+        whole_cut_ = {.left = report.imbalance, .seconds = seconds};
     });
 }
 
@@ -132,6 +135,7 @@ void Simulation::cut_by_counts()
         return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes(*model_))}, Labels::Free);
     });
     rebalance_ = Rebalance(report.imbalance, report.seconds);
+    whole_cut_ = {.left = report.imbalance, .seconds = report.seconds};
 }
 
 void Simulation::fill()
@@ -150,6 +154,7 @@ void Simulation::fill()
             if (domain_.block_of(x) == b) start.push_back({id, x, body});
         });
     }
+    domain_.forget_far();
     auto& p = particles_;
     p.resize(Index(start.size()));
     ensure(comm_.sum(std::int64_t(start.size())) == filling_.soil_count(), "the ranks together do not hold the scene's soil");
@@ -425,7 +430,7 @@ void Simulation::judge_step()
 void Simulation::inspect()
 {
     const auto remember = [&] {
-        if (scene_.time.retry) good_ = Good{particles_, clock_, my_pairs_, my_particle_steps_};
+        if (scene_.time.retry) good_ = Good{particles_, clock_, my_pairs_, my_particle_steps_, domain_.known()};
     };
     if (!good_) remember(); // the start of the run, or of its restart
     if (clock_.step - clock_.inspected < 64) return;
@@ -463,6 +468,8 @@ bool Simulation::roll_back()
     my_pairs_ = good_->pairs, my_particle_steps_ = good_->particle_steps;
     clock_.base_time = clock_.time, clock_.base_step = clock_.step;
     clock_.step_scale *= 0.5;
+    // Cuts since then have moved blocks on, further than a rank knows.
+    domain_.know_again(good_->known);
     domain_.migrate(particles_);
     rebuild(false);
     return true;
@@ -536,7 +543,24 @@ void Simulation::recut()
     for (const auto& b : mine) total += b.work;
     const double slow = slowness(total);
     for (auto& b : mine) b.work *= slow;
-    timers_.timed(Phase::Partition, [&] { return domain_.cut(mine, Method::Metis, {reach_, double(row_bytes(*model_))}); });
+    const HaloCost halo{reach_, double(row_bytes(*model_))};
+    // Handing blocks to neighbours costs nearly nothing, a cut of the whole domain much. The latter is made when what the
+    // former left behind has cost as much idle time as it will cost, or when its parts have become ragged.
+    WholeCut& whole = whole_cut_;
+    whole.owed += std::max(0.0, left_ - whole.left - noticeable_) * comm_.sum(busy_since_cut_) / comm_.size();
+    const bool again = whole.owed > whole.seconds || (whole.halo > 0 && halo_share_ > ragged_ * whole.halo);
+    timers_.timed(Phase::Partition, [&] {
+        if (again) {
+            const auto report = domain_.cut(mine, Method::Metis, halo);
+            whole = {.left = report.imbalance, .seconds = report.seconds};
+            left_ = report.imbalance, halo_share_ = 0;
+            ++structure_.whole_cuts;
+        } else {
+            const auto report = domain_.even_out(mine, halo);
+            left_ = report.after, halo_share_ = report.halo;
+            if (whole.halo == 0) whole.halo = report.halo;
+        }
+    });
     busy_since_cut_ = 0;
     ++structure_.cuts;
 }
@@ -569,6 +593,7 @@ void Simulation::rebuild(bool sort_anew)
                 const double begin = omp_get_wtime();
                 if (cut) recut();
                 structure_.migrated += domain_.migrate(p).left;
+                domain_.forget_far();
                 if (cut) rebalance_.cut(comm_, omp_get_wtime() - begin);
             }
             const Index n = p.size();

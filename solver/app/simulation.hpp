@@ -95,8 +95,9 @@ public:
     WorkDone work_done() const;
 
     struct Structure {
-        std::int64_t rebuilds = 0, cuts = 0, migrated = 0;
-        double imbalance = 1; // max/mean of the ranks' busy seconds, as last measured
+        std::int64_t rebuilds = 0, migrated = 0;
+        std::int64_t cuts = 0, whole_cuts = 0; // since the start; the latter of the whole domain by METIS
+        double imbalance = 1;                  // max/mean of the ranks' busy seconds, as last measured
         // what the guard saw, at its last look and at its worst
         double clumped = 0, most_clumped = 0, deepest = 0;
     };
@@ -176,6 +177,15 @@ private:
     Clock clock_;
     bool built_ = false;
     double busy_before_ = 0, busy_since_cut_ = 0; // s
+    struct WholeCut {
+        double left = 1, seconds = 0; // max/mean that the last cut of the whole domain promised, and what it took, s
+        double owed = 0;              // idle seconds that cuts between neighbours have left behind since, beyond `left`
+        double halo = 0;              // EvenReport::halo of the first of them
+    };
+    static constexpr double noticeable_ = 0.02; // of max/mean: nobody should act upon less
+    static constexpr double ragged_ = 1.5;      // times the halo of fresh parts
+    WholeCut whole_cut_;
+    double left_ = 1, halo_share_ = 0; // of the last cut
     std::int64_t my_pairs_ = 0, my_particle_steps_ = 0, my_asleep_ = 0, my_halo_bytes_ = 0, my_messages_ = 0;
     std::optional<RankStep> first_step_;
     Structure structure_;
@@ -183,6 +193,7 @@ private:
         Particles particles;
         Clock clock;
         std::int64_t pairs, particle_steps;
+        BlockOwners known;
     };
     std::optional<Good> good_; // for time.retry
     std::int64_t blamed_ = -1;

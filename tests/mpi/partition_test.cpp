@@ -129,29 +129,6 @@ TEST(Partition, IsEvenAndBeatsTheCurve)
     }
 }
 
-TEST(Partition, EvensOutAKnownCutOfMany)
-{
-    if (world().size() != 1) return;
-    // Parts of 3 x 3 x 6 blocks that have come to differ by 8 %; more blocks than METIS should cut again and again.
-    auto blocks = box_of_blocks(60, 60, 60);
-    ASSERT_GT(int(blocks.size()), large_graph);
-    std::vector<int> before;
-    for (auto& b : blocks) {
-        b.work = 1 + 0.08 * std::sin(0.2 * b.block[0]);
-        before.push_back((b.block[0] / 3 * 20 + b.block[1] / 3) * 10 + b.block[2] / 6);
-    }
-    const auto g = block_graph(blocks);
-    const int parts = 4000;
-    ASSERT_GT(describe(g, before, parts).imbalance, 1.07);
-    const auto after = partition(g, parts, Method::Metis, &before);
-    expect_complete(g, after, parts);
-    const auto r = describe(g, after, parts);
-    EXPECT_LE(r.imbalance, 1.05);
-    int moved = 0;
-    for (int b = 0; b < g.size(); ++b) moved += after[b] != before[b];
-    EXPECT_LT(moved, g.size() / 4) << "most work stays where it is";
-}
-
 TEST(Partition, CountsPieces)
 {
     if (world().rank() != 0) return;

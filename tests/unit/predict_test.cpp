@@ -61,13 +61,19 @@ TEST(Predict, CutsAsOftenAsItPays)
     const auto m = plain();
     const RankLoad r{.pairs = 1e7, .particles = 2e5, .messages = 1};
     const std::vector<RankLoad> ranks(64, r);
-    StepPlace at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 6400};
+    StepPlace at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
     const auto few = predict_step(ranks, at);
-    at.blocks *= 4;
+    // A cut's seconds C come every sqrt(2 C/(d t)) steps of t seconds, d = 5e-5.
+    const auto cut_of = [](const StepSeconds& s) { return 0.5 * s.recut * s.recut_steps; };
+    EXPECT_NEAR(few.recut_steps, std::sqrt(2 * cut_of(few) / (5e-5 * (few.total() - few.recut))), 1e-6 * few.recut_steps);
+    // More blocks on each rank cost more, and are cut less often.
+    at.blocks *= 100;
     const auto many = predict_step(ranks, at);
-    // Four times the cost: half as often, twice the loss (the step itself hardly changes).
-    EXPECT_NEAR(many.recut_steps / few.recut_steps, 2, 0.02);
-    EXPECT_NEAR(many.recut / few.recut, 2, 0.02);
+    EXPECT_GT(cut_of(many), 2 * cut_of(few));
+    EXPECT_GT(many.recut_steps, few.recut_steps);
+    // As many on each of 256 times the ranks: only sums over all ranks and their boxes cost more.
+    at.ranks *= 256, at.blocks *= 256;
+    EXPECT_LT(cut_of(predict_step(ranks, at)), 1.5 * cut_of(many));
 }
 
 TEST(Predict, LoadsKnowNodes)

@@ -354,6 +354,7 @@ private:
         j["memory_bytes_per_rank"] = memory;
         j["rebuilds"] = sim_->structure().rebuilds;
         j["repartitions"] = sim_->structure().cuts;
+        j["repartitions_by_metis"] = sim_->structure().whole_cuts;
         j["pair_model"] = sim_->model().name();
         const auto& seen = sim_->structure();
         j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};

@@ -2,6 +2,7 @@
 // should take on a machine of jobs/machines. Runs nothing.
 #include "io/checkpoint.hpp"
 #include "solver/app/command.hpp"
+#include "solver/app/drift.hpp"
 #include "solver/app/predict.hpp"
 #include "solver/app/simulation.hpp"
 #include <CLI/CLI.hpp>
@@ -17,7 +18,7 @@ struct Arguments {
     SceneArguments scene;
     std::vector<int> ranks;
     std::string machine = "here", from;
-    int ranks_per_node = 0, threads = 0;
+    int ranks_per_node = 0, threads = 0, recuts = 0;
     bool json = false, per_rank = false, hilbert = false;
 };
 
@@ -30,8 +31,12 @@ struct Case {
     double efficiency = 1, memory = 0; // bytes of the fullest rank
 };
 
-/// The soil of a checkpoint, wrapped into the periods. Throws BadInput for another scene's.
-std::vector<Vector> state_of(const Comm& comm, const Scene& s, const io::Path& from)
+/// The soil of a checkpoint, wrapped into the periods, and its ways there from the start, m.
+struct State {
+    std::vector<Vector> x, way;
+};
+/// Throws BadInput for another scene's.
+State state_of(const Comm& comm, const Scene& s, const io::Path& from)
 {
     const bool directory = std::filesystem::is_directory(from);
     const auto say = [](const std::string& text) { fmt::print(stderr, "kuzure: {}\n", text); };
@@ -41,7 +46,7 @@ std::vector<Vector> state_of(const Comm& comm, const Scene& s, const io::Path& f
     require_same_scene(*found, io::scene_hash(s));
     Particles p;
     io::read_checkpoint(comm, found->file, p);
-    std::vector<Vector> x(std::size_t(p.size()));
+    std::vector<Vector> x(std::size_t(p.size())), way(x.size());
     const Vector low = s.space.low.value_or(Vector{}), length = period(s);
     const auto wrapped = [&](int axis, double v, double lo, double all) {
         return s.space.periodic[axis] ? std::min(std::max(v - std::floor((v - lo) / all) * all, lo), lo + all) : v;
@@ -49,14 +54,41 @@ std::vector<Vector> state_of(const Comm& comm, const Scene& s, const io::Path& f
     for (Index i = 0; i < p.size(); ++i) {
         const Vector v = std::as_const(p)[field::position][i];
         x[i] = {wrapped(0, v.x, low.x, length.x), wrapped(1, v.y, low.y, length.y), wrapped(2, v.z, low.z, length.z)};
+        way[i] = v - std::as_const(p)[field::origin][i];
     }
-    return x;
+    return {std::move(x), std::move(way)};
 }
 
 nlohmann::ordered_json to_json(const StepSeconds& s)
 {
     return {{"pairs", s.pairs},         {"particles", s.particles}, {"imbalance", s.imbalance}, {"halo", s.halo},
             {"reduction", s.reduction}, {"rebuild", s.rebuild},     {"recut", s.recut}};
+}
+
+nlohmann::ordered_json to_json(const std::vector<DriftCut>& cuts)
+{
+    auto all = nlohmann::ordered_json::array();
+    for (const auto& c : cuts)
+        all.push_back({{"before", c.even.before},
+                       {"after", c.even.after},
+                       {"halo", c.even.halo},
+                       {"blocks", c.even.blocks},
+                       {"moved_blocks", c.even.moved},
+                       {"moved_particles", c.moved_particles},
+                       {"sweeps", c.even.sweeps},
+                       {"rounds", c.even.rounds},
+                       {"busy_seconds", c.even.busy},
+                       {"cut_bytes", c.cut_bytes},
+                       {"scattered", c.scattered},
+                       {"peers_mean", c.peers_mean},
+                       {"peers_most", c.peers_most},
+                       {"known_most", c.known_most},
+                       {"whole",
+                        {{"balance", c.whole_balance},
+                         {"cut_bytes", c.whole_bytes},
+                         {"scattered", c.whole_scattered},
+                         {"seconds", c.whole_seconds}}}});
+    return all;
 }
 
 template <class Of> std::int64_t most(const CutShare& c, Of of)
@@ -144,10 +176,20 @@ Exit scale(const Comm& comm, const Arguments& a)
     const auto model = choose_model(s, Arithmetic::Lanes);
     const double bytes = double(row_bytes(*model)), reach = list_reach(s);
     const Estimate e = estimate(s, filling, *model);
-    const auto state = a.from.empty() ? std::vector<Vector>() : state_of(comm, s, a.from);
+    const auto state = a.from.empty() ? State() : state_of(comm, s, a.from);
 
     auto ranks = a.ranks;
     std::ranges::sort(ranks);
+    if (a.recuts > 0) {
+        if (a.from.empty()) throw BadInput("--recuts moves the soil from its start to a later state: expected --from DIR");
+        auto all = nlohmann::ordered_json::array();
+        for (const int n : ranks)
+            all.push_back(
+                {{"ranks", n},
+                 {"cuts", to_json(drift(s, filling, block_space(s, filling, n), n, state.x, state.way, a.recuts, reach, bytes))}});
+        fmt::print("{}\n", all.dump(2));
+        return Exit::Ok;
+    }
     std::vector<Case> cases;
     for (const int n : ranks) {
         // A machine of one node holds all ranks.
@@ -163,7 +205,7 @@ Exit scale(const Comm& comm, const Arguments& a)
                nodes,
                double(machine.node.cores) / per_node * n,
                a.from.empty() ? share_out(StartSoil(s, filling, space), n, reach, bytes, method)
-                              : share_out(StateSoil(s, filling, space, state), n, reach, bytes, method),
+                              : share_out(StateSoil(s, filling, space, state.x), n, reach, bytes, method),
                {},
                {},
                {}};
@@ -208,6 +250,9 @@ void add_scale(CLI::App& app, Action& chosen)
     command->add_option("--threads", a->threads, "cores of each rank (default: the node's cores shared by its ranks)")
         ->check(CLI::Range(1, 4096));
     command->add_option("--from", a->from, "a later state: a checkpoint, or a result directory's newest")->type_name("DIR|FILE");
+    command
+        ->add_option("--recuts", a->recuts, "move the soil from its start to --from in so many steps, each with a cut between neighbours")
+        ->check(CLI::Range(1, 100000));
     command->add_flag("--json", a->json, "as JSON");
     command->add_flag("--per-rank", a->per_rank, "every rank's numbers in the JSON");
     command->add_flag("--hilbert", a->hilbert, "cut along the Hilbert curve, as where METIS fails");
