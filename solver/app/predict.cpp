@@ -25,8 +25,8 @@ constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, places of 
 constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 constexpr double drift = 5e-5;           // growth of max/mean - 1 per step while soil slides
-// Of a cut between neighbours: measured by `perf/scaling.py drift`.
-constexpr double even_seconds = 4.2e-5; // processor time here per block of the mean rank, of the rank that computes longest
+// Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/scaling.md).
+constexpr double even_seconds = 4.2e-5; // processor time here per block of the mean rank, of the longest rank
 constexpr double even_sweeps = 55;      // numbers told to all peers, each with a sum over all ranks
 constexpr double even_rounds = 10;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
 constexpr double even_moves = 0.065;    // particles that migrate, of a rank's
