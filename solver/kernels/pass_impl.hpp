@@ -254,8 +254,8 @@ KUZURE_INLINE std::int64_t sum_over_soil(const Model& model, const Here<V>& i, s
     T in_lane[width<V>];
     store(in_lane, inside);
     std::int64_t pairs = 0;
-    for (int k = 0; k < i.count; ++k)
-        if (i.moving >> k & 1) pairs += std::int64_t(in_lane[k]);
+#pragma GCC unroll 1 // GCC 12 would take lanes out of the register by an instruction that Knights Landing lacks
+    for (int k = 0; k < i.count; ++k) pairs += std::int64_t(in_lane[k]) & -std::int64_t(i.moving >> k & 1);
     return pairs;
 }
 
@@ -606,10 +606,11 @@ KUZURE_INLINE void advance(const Pass<T>& pass, const Model& model, const Sums<W
     // ---- who is calm
     if (pass.rest == Rest::Look || pass.rest == Rest::FallAsleep) {
         const auto activity = p[field::activity];
+        double soon[width<U>];
+        store(soon, fma(U(pass.nap), sqrt(dot(a, a)), sqrt(dot(v_end, v_end))));
+#pragma GCC unroll 1
         for (int k = 0; k < n; ++k) {
-            const auto size = [k](const Vec3<U>& b) { return length(Vector{lane(b.x, k), lane(b.y, k), lane(b.z, k)}); };
-            const bool calm = size(v_end) + pass.nap * size(a) < pass.calm_speed;
-            const bool alone = (restless >> (row + k) & 1) == 0;
+            const bool calm = soon[k] < pass.calm_speed, alone = (restless >> (row + k) & 1) == 0;
             const auto now = !calm                     ? Activity::Moves
                              : pass.rest == Rest::Look ? Activity::Calm
                              : alone                   ? Activity::Asleep

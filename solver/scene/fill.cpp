@@ -394,7 +394,8 @@ Filling::Survey Filling::survey(const Scene& scene)
         rows += Lattice::rows(*p.shape, scene.space.spacing, dimensions);
         if (const auto* polygon = std::get_if<Polygon>(p.shape)) looks += scene::looks(*polygon, scene.space.spacing);
         if (rows <= most_rows && looks <= most_looks) continue;
-        issues.push_back({Severity::Error, p.key,
+        issues.push_back({Severity::Error,
+                          p.key,
                           fmt::format("expected shapes that a computer can hold together, found {:.3g} rows of particles up to this one at "
                                       "a spacing of {} m{}; is space.spacing in metres?",
                                       rows, scene.space.spacing, looks > most_looks ? ", with too many corners" : ""),

@@ -47,7 +47,7 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
         for (const char* precision : {"double", "mixed"})
             for (const char* kernel : {"cubic spline", "wendland c2"}) {
                 SceneText t;
-                t.dimensions = c.dimensions, t.spacing = 0.04, t.h = std::string(kernel) == "cubic spline" ? 1.2 : 1.5;
+                t.dimensions = c.dimensions, t.spacing = 0.04, t.h = std::string(kernel) == "cubic spline" ? 1.2 : 1.4;
                 const double d = t.spacing, n = c.dimensions == 3 ? 8 * d : 16 * d;
                 if (c.periodic) t.space = fmt::format("low = [0.0, 0.0, -1.0]\nhigh = [{}, {}, 3.0]\nperiodic = [{}]", n, n, c.periodic);
                 t.strength = "friction_angle = 25.0";
