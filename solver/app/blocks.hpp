@@ -29,7 +29,7 @@ inline double list_reach(const Scene& s) { return s.support() * (1 + s.accuracy.
 struct StepWork {
     std::int64_t particles = 0, soil_pairs = 0, wall_pairs = 0;
     // A wall pair and a particle's update in units of a soil pair: docs/scaling.md
-    static constexpr double wall = 0.5, particle = 8;
+    static constexpr double wall = 2, particle = 11;
     double pairs() const { return double(soil_pairs) + wall * double(wall_pairs); }
     double total() const { return pairs() + particle * double(particles); }
     void add(const StepWork& o) { particles += o.particles, soil_pairs += o.soil_pairs, wall_pairs += o.wall_pairs; }

@@ -45,7 +45,7 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     // So many particles that every rank has what a small run has, and no more than the scene itself.
     const double wanted = double(std::clamp<std::int64_t>(soil, 216, 8000 * std::int64_t(comm.size())));
     const double points = std::round(s.dimensions == 3 ? std::cbrt(wanted) : std::sqrt(wanted)), edge = points * s.space.spacing;
-    const double shake = 0.1 * s.space.spacing;
+    const double shake = 0.2 * s.space.spacing;
     s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
     s.walls.clear();
     s.bodies.resize(1);

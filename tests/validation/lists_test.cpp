@@ -51,7 +51,8 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
                 const double d = t.spacing, n = c.dimensions == 3 ? 8 * d : 16 * d;
                 if (c.periodic) t.space = fmt::format("low = [0.0, 0.0, -1.0]\nhigh = [{}, {}, 3.0]\nperiodic = [{}]", n, n, c.periodic);
                 t.strength = "friction_angle = 25.0";
-                t.bodies = box("body", {0, 0, 0}, {n, n, n}, "soil = \"s\"\nvelocity = [2.0, 1.0, -1.0]");
+                t.bodies = box("body", {0, 0, 0}, {n, n, n},
+                               fmt::format("soil = \"s\"\nvelocity = [2.0, {}, -1.0]", c.dimensions == 3 ? 1.0 : 0.0));
                 t.walls = box("wall", {0, 0, -4 * d}, {n, n, 0}, "");
                 if (!c.periodic) t.walls += box("wall", {n + 4 * d, 0, 0}, {n + 8 * d, n, n}, "");
                 t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.5, beta = 1.0 }\n";
