@@ -63,9 +63,10 @@ TEST(Predict, CutsAsOftenAsItPays)
     const std::vector<RankLoad> ranks(64, r);
     StepPlace at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
     const auto few = predict_step(ranks, at);
-    // A cut's seconds C come every sqrt(2 C/(d t)) steps of t seconds, d = 5e-5.
+    // A cut's seconds C come every sqrt(2 C/(d t)) steps of t seconds, d = 6.1e-5 (35152/n)^0.56.
     const auto cut_of = [](const StepSeconds& s) { return 0.5 * s.recut * s.recut_steps; };
-    EXPECT_NEAR(few.recut_steps, std::sqrt(2 * cut_of(few) / (5e-5 * (few.total() - few.recut))), 1e-6 * few.recut_steps);
+    EXPECT_NEAR(few.recut_steps, std::sqrt(2 * cut_of(few) / (6.1e-5 * std::pow(35152 / 2e5, 0.56) * (few.total() - few.recut))),
+                1e-6 * few.recut_steps);
     // More blocks on each rank cost more, and are cut less often.
     at.blocks *= 100;
     const auto many = predict_step(ranks, at);
