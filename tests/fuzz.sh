@@ -38,7 +38,11 @@ runs=${2:?how many executions}
 command -v clang++ >/dev/null || { echo "clang is missing: apt-get install clang libclang-rt-dev" >&2; exit 1; }
 mkdir -p build
 flock build/.fuzz-lock jobs/build.sh fuzz scene_fuzz checkpoint_fuzz # both may be started at once
-mkdir -p build/fuzz/corpus/$what build/fuzz/findings "$logs"
+mkdir -p build/fuzz/findings "$logs"
+# Goes on from the corpus that earlier runs have grown.
+grown=tests/fuzz/grown/$what.tar.xz
+if [ ! -d build/fuzz/corpus/$what ] && [ -f "$grown" ]; then mkdir -p build/fuzz/corpus && tar -C build/fuzz/corpus -xJf "$grown"; fi
+mkdir -p build/fuzz/corpus/$what
 # What is freed is kept from use for 8 MB, more than an input takes; of the stack at each allocation one frame is kept: findings
 # are looked at again with all of them.
 export ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=8:malloc_context_size=1:symbolize=0
