@@ -27,7 +27,7 @@ public:
         : Domain(comm, BlockSpace(origin, block_size, periodic, period_low, period_length))
     {
     }
-    Domain(const Comm& comm, BlockSpace space) : comm_(comm), space_(std::move(space)) {}
+    Domain(const Comm& comm, const BlockSpace& space) : comm_(comm), space_(space) {}
 
     /// BlockSpace::block_of().
     Block block_of(Vector x) const { return space_.block_of(x); }
