@@ -49,7 +49,7 @@ void BlockOwners::forget_far(int rank, const std::array<std::int32_t, 3>& period
             for (int j = -2; j <= 2; ++j)
                 for (int l = -2; l <= 2; ++l) {
                     const Block there = wrapped({b[0] + i, b[1] + j, b[2] + l}, period);
-                    if (std::ranges::all_of(there, [](auto c) { return c >= -block_limit && c < block_limit; })) near.insert(key_of(there));
+                    if (within_limit(there)) near.insert(key_of(there));
                 }
     }
     std::vector<Block> blocks;

@@ -16,10 +16,9 @@ const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curv
 // -----------------------------------------------------------------------------------------------------
 void check_block(const BlockWork& b, const BlockGrid& grid)
 {
-    for (int a = 0; a < 3; ++a) {
-        ensure(b.block[a] >= -block_limit && b.block[a] < block_limit, "a block lies beyond the block limit");
+    ensure(within_limit(b.block), "a block lies beyond the block limit");
+    for (int a = 0; a < 3; ++a)
         ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]), "a block lies outside its period");
-    }
     ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
            "a block's work or particle count is negative or not a number");
 }
@@ -36,8 +35,7 @@ void append_links(const BlockGraph& g, const BlockIndex& index, int b, std::vect
             if (d[a]) share *= std::min(1.0, g.grid.reach[a]);
         }
         there = wrapped(there, g.grid.period);
-        const bool inside = std::ranges::all_of(there, [](std::int32_t c) { return c >= -block_limit && c < block_limit; });
-        const int n = inside ? index[there] : -1;
+        const int n = within_limit(there) ? index[there] : -1;
         if (n >= 0) to.push_back({n, d, share * g.grid.row_bytes * (g.particles[b] + g.particles[n])});
     }
 }

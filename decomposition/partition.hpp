@@ -2,6 +2,7 @@
 // Who gets which block of space: a graph of the blocks that hold soil, weighted by work and by halo bytes,
 // cut into parts of equal work with little halo. Serial and without MPI, so `kuzure scale` cuts for any
 // number of ranks.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -16,6 +17,10 @@ using Block = std::array<std::int32_t, 3>;
 
 /// Blocks reach from -block_limit to block_limit - 1 on each axis.
 inline constexpr std::int32_t block_limit = 1 << 20;
+inline bool within_limit(const Block& b)
+{
+    return std::ranges::all_of(b, [](std::int32_t c) { return c >= -block_limit && c < block_limit; });
+}
 
 /// A block's place as one number. Only for blocks within the limit.
 inline std::uint64_t key_of(const Block& b)

@@ -1,4 +1,5 @@
 #include "io/history.hpp"
+#include <cmath>
 #include <fmt/format.h>
 
 namespace kuzure::io {
@@ -13,18 +14,22 @@ std::string units(int dimensions)
     return fmt::format("# s,1,s,{0},{0},{0},{0},{0},{0},{0},1,m/s,m,m,m,m,m", energy);
 }
 
-/// Shortest digits that read back to the same number.
+/// Shortest digits that read back to the same number. What is not there is written here: fmt compares it, which traps.
+std::string cell(double x) { return std::isnan(x) ? "nan" : fmt::format("{}", x); }
+std::string rounded(double x) { return std::isnan(x) ? "nan" : fmt::format("{:.4g}", x); }
+
 std::string text(const HistoryRow& r)
 {
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}", r.time, r.step, r.dt, r.kinetic, r.potential, r.elastic,
-                       r.plastic, r.viscous, r.wall, r.damping, r.residual, r.max_speed, r.height, r.front_min_x, r.front_max_x,
-                       r.front_min_y, r.front_max_y);
+    std::string line = fmt::format("{},{}", cell(r.time), r.step);
+    for (double x : {r.dt, r.kinetic, r.potential, r.elastic, r.plastic, r.viscous, r.wall, r.damping, r.residual, r.max_speed, r.height,
+                     r.front_min_x, r.front_max_x, r.front_min_y, r.front_max_y})
+        line += ',' + cell(x);
+    return line;
 }
 
-/// Shortest digits that read back to the same number.
 std::string text(const ProgressRow& r)
 {
-    return fmt::format("{},{},{},{:.3f},{:.4g},{:.4g}", r.time, r.step, r.dt, r.wall, r.steps_per_second, r.balance);
+    return fmt::format("{},{},{},{:.3f},{},{}", cell(r.time), r.step, cell(r.dt), r.wall, rounded(r.steps_per_second), rounded(r.balance));
 }
 
 } // namespace

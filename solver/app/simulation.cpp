@@ -97,8 +97,12 @@ void Simulation::prepare()
     for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
     particles_.require(field::position, field::velocity, field::half_velocity, field::density, field::half_density, field::stress,
                        field::half_stress, field::plastic_strain, field::sorted_position, field::origin, field::id, field::soil);
-    if (scene_.accuracy.sleep_below > 0) particles_.require(field::activity);
-        // Denormals are flushed in every thread, whatever ran before.
+    if (scene_.accuracy.sleep_below > 0) {
+        particles_.require(field::activity);
+        steps_between_looks_ = scene::steps_between_looks(scene_);
+    }
+
+    // Denormals are flushed in every thread, whatever ran before.
 #pragma omp parallel
     flush_denormals();
 
@@ -198,7 +202,7 @@ Rest Simulation::rest() const
 {
     // Damping settles a state: there soil is slow before it is at rest.
     if (scene_.accuracy.sleep_below == 0 || forces_.damping > 0) return Rest::Nobody;
-    const auto phase = clock_.step % scene::steps_between_looks(scene_);
+    const auto phase = clock_.step % steps_between_looks_;
     return phase == 0 ? Rest::Look : phase == 1 ? Rest::FallAsleep : Rest::Keep;
 }
 
@@ -250,7 +254,7 @@ Wishes Simulation::step(Wishes mine)
                          .high = scene_.space.high,
                          .rest = rest(),
                          .calm_speed = scene_.accuracy.sleep_below,
-                         .nap = double(scene::steps_between_looks(scene_) - 1) * dt};
+                         .nap = double(steps_between_looks_ - 1) * dt};
             for (int axis = 0; axis < 3; ++axis) // a periodic axis has no way out
                 if (scene_.space.periodic[axis] && pass.low) {
                     const double all = std::numeric_limits<double>::infinity();
@@ -430,7 +434,7 @@ void Simulation::judge_step()
 void Simulation::inspect()
 {
     const auto remember = [&] {
-        if (scene_.time.retry) good_ = Good{particles_, clock_, my_pairs_, my_particle_steps_, domain_.known()};
+        if (scene_.time.retry) good_ = Good{particles_, clock_, my_pairs_, my_particle_steps_, my_asleep_, domain_.known()};
     };
     if (!good_) remember(); // the start of the run, or of its restart
     if (clock_.step - clock_.inspected < 64) return;
@@ -465,7 +469,7 @@ bool Simulation::roll_back()
     trouble_ = clock_.time;
     particles_ = good_->particles;
     clock_ = good_->clock;
-    my_pairs_ = good_->pairs, my_particle_steps_ = good_->particle_steps;
+    my_pairs_ = good_->pairs, my_particle_steps_ = good_->particle_steps, my_asleep_ = good_->asleep;
     clock_.base_time = clock_.time, clock_.base_step = clock_.step;
     clock_.step_scale *= 0.5;
     // Cuts since then have moved blocks on, further than a rank knows.

@@ -171,7 +171,8 @@ private:
     StepForces forces_;
     PoreWater water_;
     bool evolving_ = false;
-    double reach_, skin_; // m
+    std::int64_t steps_between_looks_ = 1; // where soil may sleep
+    double reach_, skin_;                  // m
     // How far beyond the support the pruned lists reach, and a bound of the way of any particle since they were made, m.
     double pruned_margin_ = 0, pruned_way_ = 0;
     Clock clock_;
@@ -192,7 +193,7 @@ private:
     struct Good {
         Particles particles;
         Clock clock;
-        std::int64_t pairs, particle_steps;
+        std::int64_t pairs, particle_steps, asleep;
         BlockOwners known;
     };
     std::optional<Good> good_; // for time.retry

@@ -714,14 +714,16 @@ private:
         using U = pass::Update<V>;
         constexpr int W = width<V>;
         const auto& store = *p.particles;
-        if (p.rest == Rest::Keep && keep_asleep(p, cluster, total)) return;
         pass::Here<V> i;
         i.first = p.lists->first(cluster);
         i.count = p.lists->count(cluster);
         i.owned = i.moving = (1u << i.count) - 1;
-        if (p.rest == Rest::Keep)
+        if (p.rest == Rest::Keep) {
+            const auto activity = store[field::activity];
             for (int k = 0; k < i.count; ++k)
-                if (store[field::activity][i.first + k] == std::int32_t(Activity::Asleep)) i.moving &= ~(1u << k), ++total.asleep;
+                if (activity[i.first + k] == std::int32_t(Activity::Asleep)) i.moving &= ~(1u << k), ++total.asleep;
+            if (i.moving == 0) return hand_on(p, cluster, i.first, i.count);
+        }
         i.position = pass::positions_of<V>(p.records, i.first);
         const auto v = store[field::velocity];
         i.v = {pass::load_narrow<V>(v.column[0] + i.first), pass::load_narrow<V>(v.column[1] + i.first),
@@ -752,19 +754,12 @@ private:
                              unit_, dimensions_, place_, total);
     }
 
-    /// True if the whole cluster sleeps: its records are handed on, and its list is pruned when it wakes.
-    static bool keep_asleep(const Pass<T>& p, Index cluster, pass::Accumulated<pass::Update<V>>& total)
+    /// The records of a cluster that sleeps as a whole; its list is pruned when it wakes.
+    static void hand_on(const Pass<T>& p, Index cluster, Index first, int count)
     {
-        const Index first = p.lists->first(cluster);
-        const int count = p.lists->count(cluster);
-        const std::int32_t* activity = std::as_const(*p.particles)[field::activity].column[0] + first;
-        for (int k = 0; k < count; ++k)
-            if (activity[k] != std::int32_t(Activity::Asleep)) return false;
         std::copy_n(p.records + first, count, p.next + first);
         if constexpr (Model::tensile) std::copy_n(p.tension + first, count, p.next_tension + first);
         if (p.prune) p.lists->pruned(cluster).n = -1;
-        total.asleep += count;
-        return true;
     }
 
     double unit_;

@@ -12,14 +12,14 @@ namespace {
 constexpr double slow = 2e-2; // m/s
 
 /// Level ground at rest; a block falls on its middle.
-SceneText struck_ground(double sleep_below, double drop = 1)
+SceneText struck_ground(double sleep_below)
 {
     SceneText t;
     t.spacing = 0.02;
     t.space = periodic(2, -1, 3);
     t.strength = "friction_angle = 25.0\ncone = \"plane strain\"";
     t.bodies = box("body", {0, 0, 0}, {2, 0, 0.4}, "soil = \"s\"\nstress = \"at rest\"") +
-               box("body", {0.9, 0, 0.4 + drop * 0.2}, {1.1, 0, 0.6 + drop * 0.2}, "soil = \"s\"");
+               box("body", {0.9, 0, 0.6}, {1.1, 0, 0.8}, "soil = \"s\"");
     t.walls = box("wall", {0, 0, -0.08}, {2, 0, 0}, "");
     t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.1 }\n";
     t.accuracy = fmt::format("kernel = \"cubic spline\"\nsleep_below = {}\n", sleep_below);
