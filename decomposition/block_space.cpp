@@ -35,7 +35,7 @@ bool BlockSpace::raw_block(Vector x, Block& b) const
     const double at[3] = {x.x, x.y, x.z};
     for (int a = 0; a < 3; ++a) {
         const double k = std::floor((at[a] - origin_[a]) / size_[a]);
-        if (!(k >= -block_limit && k < block_limit)) return false;
+        if (!(std::isgreaterequal(k, -block_limit) && std::isless(k, block_limit))) return false; // quietly, of not-a-number too
         b[a] = std::int32_t(k);
     }
     return true;

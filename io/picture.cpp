@@ -38,7 +38,7 @@ constexpr Map viridis = {{{68, 1, 84},
 constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48}, broken_red = {222, 30, 38};
 
 /// Values that can be compared with others: of a state whose numbers failed, not all can.
-bool usable(double v) { return std::fabs(v) < 1e100; }
+bool usable(double v) { return std::isless(std::fabs(v), 1e100); } // quietly, of not-a-number too
 
 Rgb pick(const Map& map, double t)
 {
@@ -102,22 +102,22 @@ Range natural_range(const Team& team, const std::vector<double>& values, scene::
     const bool from_zero = color != scene::Color::Pressure;
     if (from_zero) low = std::min(low, 0.0);
     Range r{low, high};
-    if (high > low) {
+    if (high - low > 0) {
         std::vector<std::int64_t> count(2048);
-        const double per_bin = double(count.size()) / (high - low);
+        const double bins = double(count.size()), bin = (high - low) / bins;
         for (const double v : values)
-            if (usable(v)) ++count[std::min(std::size_t((v - low) * per_bin), count.size() - 1)];
+            if (usable(v)) ++count[std::min(std::size_t((v - low) / (high - low) * bins), count.size() - 1)];
         team.sum(std::span<std::int64_t>(count));
         std::int64_t all = 0, seen = 0;
         for (const auto c : count) all += c;
         const auto cut = [&](auto first, auto last) {
             seen = 0;
-            auto bin = first;
-            while (bin != last && (seen += *bin) * 1000 < all) ++bin;
-            return bin;
+            auto at = first;
+            while (at != last && (seen += *at) * 1000 < all) ++at;
+            return at;
         };
-        const double top = high - double(cut(count.rbegin(), count.rend()) - count.rbegin()) / per_bin;
-        const double bottom = low + double(cut(count.begin(), count.end()) - count.begin()) / per_bin;
+        const double top = high - double(cut(count.rbegin(), count.rend()) - count.rbegin()) * bin;
+        const double bottom = low + double(cut(count.begin(), count.end()) - count.begin()) * bin;
         if (top < low + 0.8 * (high - low)) r.high = top, r.above = true;
         if (!from_zero && bottom > low + 0.2 * (high - low)) r.low = bottom, r.below = true;
     } else {

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <omp.h>
 #include <sched.h>
 
@@ -30,16 +31,27 @@ io::Path SceneArguments::results(const Scene& scene, const std::string& asked) c
     return io::Path("results") / io::Path(file).stem();
 }
 
+std::string other_writer(const io::Checkpoint& from)
+{
+    const auto header = nlohmann::json::parse(from.header, nullptr, false);
+    const std::string writer = header.is_object() ? header.value("version", std::string("an unnamed program")) : "an unnamed program";
+    return writer == version_text() ? "" : writer;
+}
+
 void require_same_scene(const io::Checkpoint& from, const std::string& scene_hash)
 {
     if (from.scene_hash == scene_hash) return;
-    throw BadInput(
-        fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
-                    "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint",
-                    from.file.string(), from.scene_hash, scene_hash));
+    const std::string writer = other_writer(from);
+    throw BadInput(fmt::format(
+        "{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
+        "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint{}",
+        from.file.string(), from.scene_hash, scene_hash,
+        writer.empty()
+            ? ""
+            : fmt::format("; if that is the one given, go on with the program that wrote it, {}: this is {}, which may know other "
+                          "keys",
+                          writer, version_text())));
 }
-
-std::string version() { return KUZURE_VERSION; }
 
 std::string version_text()
 {

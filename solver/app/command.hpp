@@ -30,6 +30,8 @@ struct SceneArguments {
     io::Path results(const Scene&, const std::string& asked) const;
 };
 
+/// Version, compiler and instruction set of the program that wrote a checkpoint; empty if it was this one.
+std::string other_writer(const io::Checkpoint&);
 /// Throws BadInput where a checkpoint belongs to another scene than the one of this hash.
 void require_same_scene(const io::Checkpoint&, const std::string& scene_hash);
 
@@ -44,8 +46,7 @@ void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);
 
-/// "0.1.0", and a text with git hash, compiler, instruction set and packages.
-std::string version();
+/// The program's version, git hash, compiler and instruction set.
 std::string version_text();
 
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package

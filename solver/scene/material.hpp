@@ -93,7 +93,7 @@ struct Material {
         }
         if (soil.dilation_decay) m.dilation_decay = *soil.dilation_decay;
         if (const auto& r = soil.rate_friction) {
-            m.rate_excess = std::tan(r->friction_angle) / std::tan(soil.friction_angle) - 1;
+            m.rate_excess = soil.friction_angle > 0 ? std::tan(r->friction_angle) / std::tan(soil.friction_angle) - 1 : 0; // or refused
             m.inertial_number = r->inertial_number, m.grain = r->grain, m.grain_density = r->grain_density;
         }
         return m;

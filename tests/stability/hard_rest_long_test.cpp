@@ -21,3 +21,42 @@ TEST(H13Long, HeapAtRest)
         EXPECT_TRUE(c.at_most(name + "drift of the last quarter less that of the first", r.late - r.early, "dx", 1e-6, k.extra));
     }
 }
+
+TEST(H13Long, TheSeedsHeapAtRest)
+{
+    Case c("H13-seed");
+    // The cube of 0.8 m of jobs/scenes/quickstart.toml as 15^3 particles; it has come to rest after 4.4 s.
+    Scene s = io::read_scene(KUZURE_SOURCE_DIR "/jobs/scenes/quickstart.toml",
+                             std::vector<std::string>{fmt::format("space.spacing={}", 0.8 / 15), "accuracy.cfl=0.3", "time.end=31.0"});
+    s.time.step.reset();
+    Simulation sim(Comm::world(), s);
+    const auto where = [&] {
+        std::map<std::int64_t, Vector> x;
+        each(sim, [&](Index i) { x[sim.particles()[field::id][i]] = position(sim, i); });
+        return x;
+    };
+    const auto drift = [&](const std::map<std::int64_t, Vector>& from) {
+        double most = 0;
+        each(sim, [&](Index i) { most = std::max(most, length(position(sim, i) - from.at(sim.particles()[field::id][i]))); });
+        return most / s.space.spacing;
+    };
+    double potential = 0, kinetic = 0;
+    each(sim, [&](Index i) { potential += particle_mass(sim, i) * gravity * position(sim, i).z; });
+    run_to(sim, 4.4);
+    const auto start = where();
+    run_to(sim, 11);
+    const double early = drift(start);
+    run_to(sim, 24.4);
+    const auto third = where();
+    while (!sim.finished()) {
+        sim.step();
+        if (sim.steps() % 20) continue;
+        double sum = 0;
+        each(sim, [&](Index i) { sum += 0.5 * particle_mass(sim, i) * dot(velocity(sim, i), velocity(sim, i)); });
+        kinetic = std::max(kinetic, sum / potential);
+    }
+    EXPECT_TRUE(c.at_most("100 sqrt(H/g), the seed's cube, 15^3: drift", drift(start), "dx", 0.1));
+    EXPECT_TRUE(c.at_most("the seed's cube: drift of the last quarter less that of the first", drift(third) - early, "dx", 1e-6));
+    EXPECT_TRUE(c.at_most("the seed's cube: kinetic over potential energy", kinetic, "1", 1e-8,
+                          {.note = "single loose grains tremble with some mm/s", .achieved = 1e-6}));
+}

@@ -109,6 +109,8 @@ TEST_F(PictureTest, EveryColourAndNoSoilAtAll)
         draw(scene::View::Oblique, color);
         draw(scene::View::Oblique, color, 2);
     }
+    for (Index i = 0; i < p.size(); ++i) p[field::velocity].set(i, Vector{1e-309 * double(i), 0, 0});
+    draw(scene::View::Oblique, scene::Color::Speed); // so slow that 1/speed is infinite
     p.resize(0);
     draw(scene::View::Oblique, scene::Color::Speed);
 }

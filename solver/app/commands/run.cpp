@@ -61,8 +61,7 @@ std::string header_text(const Simulation& sim)
                                   {"stepping", {c.step_scale, c.base_time}},
                                   {"steps_from", {c.base_step, c.inspected}},
                                   {"model", sim.model().name()},
-                                  {"instruction_set", instruction_set()},
-                                  {"version", version()}}
+                                  {"version", version_text()}}
         .dump();
 }
 
@@ -193,6 +192,9 @@ private:
             dir_.emplace(comm_, where, io::Existing::GoOn);
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
+            if (const auto writer = other_writer(*from); !writer.empty())
+                warn(fmt::format("this checkpoint was written by {}; this is {}: the bits from here on may be others", writer,
+                                 version_text()));
         } else {
             dir_.emplace(comm_, where, args_.force || args_.restart ? io::Existing::MoveAside : io::Existing::Refuse);
             if (!dir_->moved_to().empty()) say(fmt::format("the old results are now in {}", dir_->moved_to().string()));
