@@ -82,6 +82,16 @@ Comm::Comm(std::unique_ptr<Handle> handle) : handle_(std::move(handle))
 
 Comm::~Comm() { MPI_Comm_free(&handle_->comm); }
 
+std::string Comm::library()
+{
+    // "Open MPI v4.1.4, package: Debian Open MPI, ...", "MPICH Version: 4.0.2\n..."
+    char text[MPI_MAX_LIBRARY_VERSION_STRING] = "";
+    int length = 0;
+    MPI_Get_library_version(text, &length);
+    const std::string all(text, std::size_t(length));
+    return all.substr(0, all.find_first_of(",\n"));
+}
+
 const Comm& Comm::world()
 {
     ensure(the_world() != nullptr, "Comm::world() outside an Environment");

@@ -73,6 +73,8 @@ public:
 
     /// All ranks of the program, on a communicator of kuzure's own. Throws Broken outside an Environment.
     static const Comm& world();
+    /// Name and version of the MPI library.
+    static std::string library();
     Comm(const Comm&) = delete;
     ~Comm() override;
 

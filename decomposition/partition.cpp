@@ -10,6 +10,11 @@
 
 namespace kuzure {
 
+std::string partitioner_library()
+{
+    return "METIS " + std::to_string(METIS_VER_MAJOR) + '.' + std::to_string(METIS_VER_MINOR) + '.' + std::to_string(METIS_VER_SUBMINOR);
+}
+
 const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curve"; }
 
 // ---- the graph

@@ -7,10 +7,14 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
 namespace kuzure {
+
+/// Name and version of the library that cuts graphs.
+std::string partitioner_library();
 
 /// Place of a block in the grid of blocks, by axis.
 using Block = std::array<std::int32_t, 3>;

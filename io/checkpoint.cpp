@@ -13,6 +13,8 @@ using nlohmann::json;
 
 constexpr int format_version = 1;
 constexpr const char* format_name = "kuzure checkpoint";
+// Of a result directory; the unnamed one is newer than the previous where a crash fell between the two renames.
+constexpr const char *newest_name = "checkpoint.h5", *unnamed_name = "checkpoint.h5.tmp", *previous_name = "checkpoint.prev.h5";
 constexpr std::uint64_t rows_at_a_time = 1 << 17; // while reading
 constexpr std::uint64_t longest_text = 64 << 20;  // bytes of manifest or header
 
@@ -207,8 +209,8 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
 
 Path write_checkpoint(const Team& team, const Path& directory, const Particles& p, const std::string& scene_hash, const std::string& header)
 {
-    Path file = directory / "checkpoint.h5";
-    const Path previous = directory / "checkpoint.prev.h5";
+    Path file = directory / newest_name;
+    const Path previous = directory / previous_name;
     try {
         const std::int64_t total = team.sum(std::int64_t(p.size()));
         const auto first = std::uint64_t(team.sum_below(std::int64_t(p.size())));
@@ -251,6 +253,19 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
     return file;
 }
 
+Path keep_generation(const Team& team, const Checkpoint& good)
+{
+    const Path directory = directory_of(good.file), newest = directory / newest_name;
+    const bool unnamed = good.file.filename() == unnamed_name, older = good.file.filename() == previous_name;
+    if (unnamed || older)
+        on_root(team, [&] {
+            if (std::filesystem::exists(newest)) move_file(newest, directory / "checkpoint.damaged.h5");
+            if (unnamed) move_file(good.file, newest);
+            sync(directory);
+        });
+    return unnamed ? newest : good.file;
+}
+
 Checkpoint read_checkpoint(const Team& team, const Path& file, Particles& into) { return read_all(team, file, &into); }
 
 Checkpoint verify_checkpoint(const Team& team, const Path& file) { return read_all(team, file, nullptr); }
@@ -258,8 +273,7 @@ Checkpoint verify_checkpoint(const Team& team, const Path& file) { return read_a
 std::optional<Checkpoint> newest_good(const Team& team, const Path& directory, const std::function<void(const std::string&)>& say)
 {
     std::vector<std::string> passed_over;
-    // The unrenamed file is newer than the previous generation where the crash fell between the two renames.
-    for (const char* name : {"checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.prev.h5"}) {
+    for (const char* name : {newest_name, unnamed_name, previous_name}) {
         const Path file = directory / name;
         if (!team.any(team.rank() == 0 && std::filesystem::exists(file))) continue;
         const bool half_written = file.extension() == ".tmp";

@@ -373,4 +373,11 @@ std::string H5Reader::text(const std::string& object, const std::string& attribu
     return v;
 }
 
+std::string hdf5_library()
+{
+    unsigned major = 0, minor = 0, release = 0;
+    H5get_libversion(&major, &minor, &release);
+    return fmt::format("HDF5 {}.{}.{}", major, minor, release);
+}
+
 } // namespace kuzure::io

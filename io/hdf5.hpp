@@ -7,6 +7,9 @@
 
 namespace kuzure::io {
 
+/// Name and version of the HDF5 library.
+std::string hdf5_library();
+
 /// Number types a table may hold.
 enum class Number { Float64, Int64, Int32, UInt8 };
 template <class T> inline constexpr Number number_of = Number::Float64;

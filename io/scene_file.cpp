@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <map>
 #include <numbers>
+#include <sstream>
 
 namespace kuzure::io {
 namespace {
@@ -472,6 +474,27 @@ std::string scene_hash(const Scene& scene)
     std::uint64_t hash = 14695981039346656037ull;
     for (const char c : written(scene, Purpose::Hash)) hash = (hash ^ (unsigned char)(c)) * 1099511628211ull;
     return fmt::format("{:016x}", hash);
+}
+
+std::string physics_difference(const Scene& was, const Scene& is)
+{
+    std::map<std::string, std::array<std::string, 2>> values; // by key; empty where a scene does not have it
+    for (const int k : {0, 1}) {
+        std::istringstream lines(written(k ? is : was, Purpose::Hash));
+        for (std::string line; std::getline(lines, line);) {
+            const auto at = line.find(" = ");
+            values[line.substr(0, at)][std::size_t(k)] = line.substr(at + 3);
+        }
+    }
+    std::string out;
+    int count = 0;
+    for (const auto& [key, value] : values) {
+        if (value[0] == value[1]) continue;
+        if (++count > 5) return out + ", and more";
+        const auto shown = [](const std::string& v) { return v.empty() ? "nothing" : v; };
+        out += fmt::format("{}{}: {} there, {} here", count > 1 ? "; " : "", key, shown(value[0]), shown(value[1]));
+    }
+    return out;
 }
 
 std::string scene_reference()

@@ -30,6 +30,8 @@ std::string write_scene(const Scene&);
 /// 16 hexadecimal digits of all that changes the physics: everything but title, time.end, soil names and
 /// [output].
 std::string scene_hash(const Scene&);
+/// The first keys in which the physics of two scenes differ, with both values; empty where scene_hash is the same.
+std::string physics_difference(const Scene& was, const Scene& is);
 
 /// Every key with type, unit, default, range and meaning, as Markdown.
 std::string scene_reference();

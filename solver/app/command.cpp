@@ -1,4 +1,7 @@
 #include "solver/app/command.hpp"
+#include "decomposition/partition.hpp"
+#include "io/hdf5.hpp"
+#include "solver/core/ensure.hpp"
 #include "solver/core/simd.hpp"
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -38,20 +41,30 @@ std::string other_writer(const io::Checkpoint& from)
     return writer == version_text() ? "" : writer;
 }
 
-void require_same_scene(const io::Checkpoint& from, const std::string& scene_hash)
+void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scene& scene)
 {
-    if (from.scene_hash == scene_hash) return;
+    const std::string hash = io::scene_hash(scene);
+    if (from.scene_hash == hash) return;
+    const io::Path beside = io::directory_of(from.file) / "scene.toml";
+    std::string differs;
+    try {
+        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside, {}, scene::StepLimit::Force), scene);
+    } catch (const std::runtime_error&) { // not there, or not readable any more: the hashes have to do
+    }
+    differs = comm.broadcast(differs);
+    std::string text = fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same "
+                                   "physics; only title, time.end and [output] may change on a restart. ",
+                                   from.file.string(), from.scene_hash, hash);
     const std::string writer = other_writer(from);
-    throw BadInput(fmt::format(
-        "{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same physics; "
-        "only title, time.end and [output] may change on a restart. Remedy: the scene.toml beside the checkpoint{}",
-        from.file.string(), from.scene_hash, scene_hash,
-        writer.empty()
-            ? ""
-            : fmt::format("; if that is the one given, go on with the program that wrote it, {}: this is {}, which may know other "
-                          "keys",
-                          writer, version_text())));
+    if (!differs.empty()) text += fmt::format("Different from {}: {}. Remedy: run with that scene.toml", beside.string(), differs);
+    else if (writer.empty()) text += "Remedy: the scene.toml beside the checkpoint";
+    else
+        text += fmt::format("It was written by {}; this is {}, which may know other keys. Remedy: go on with the program that wrote it",
+                            writer, version_text());
+    throw BadInput(text);
 }
+
+std::string packages_text() { return fmt::format("{}, {}, {}", Comm::library(), io::hdf5_library(), partitioner_library()); }
 
 std::string version_text()
 {

@@ -32,8 +32,8 @@ struct SceneArguments {
 
 /// Version, compiler and instruction set of the program that wrote a checkpoint; empty if it was this one.
 std::string other_writer(const io::Checkpoint&);
-/// Throws BadInput where a checkpoint belongs to another scene than the one of this hash.
-void require_same_scene(const io::Checkpoint&, const std::string& scene_hash);
+/// Collective. Throws BadInput, with the keys that differ, where a checkpoint belongs to another scene.
+void require_same_scene(const Comm&, const io::Checkpoint&, const Scene&);
 
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
@@ -48,6 +48,8 @@ void add_completion(CLI::App&, Action& chosen);
 
 /// The program's version, git hash, compiler and instruction set.
 std::string version_text();
+/// The libraries that its answers rest on, and their versions.
+std::string packages_text();
 
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package
 /// installed under lib/kuzure. "kuzure" where the system does not say.

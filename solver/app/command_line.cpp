@@ -26,8 +26,12 @@ std::string wrapped(const std::string& text, std::size_t width)
 }
 
 /// What an option takes, without the checks that CLI11 writes behind it; empty for a flag.
+/// Whether an option's value comes after "=" or not at all: a flag with a value of its own, "--name{value}".
+bool takes_optional_value(const CLI::Option* o) { return !o->get_fnames().empty(); }
+
 std::string value_of(const CLI::Option* o)
 {
+    if (takes_optional_value(o)) return "FILE";
     const std::string name = o->get_type_size() != 0 ? o->get_type_name() : "";
     return name.substr(0, name.find(':'));
 }
@@ -38,9 +42,14 @@ class Page final : public CLI::Formatter {
 public:
     Page() { column_width(left); }
     std::string make_option_desc(const CLI::Option* o) const override { return wrapped(Formatter::make_option_desc(o), columns - left); }
+    std::string make_option_name(const CLI::Option* o, bool positional) const override
+    {
+        const std::string name = Formatter::make_option_name(o, positional);
+        return takes_optional_value(o) ? fmt::format("{}[={}]", name.substr(0, name.find('{')), value_of(o)) : name;
+    }
     std::string make_option_opts(const CLI::Option* o) const override
     {
-        if (o->get_positional()) return "";
+        if (o->get_positional() || takes_optional_value(o)) return "";
         std::string out = value_of(o).empty() ? "" : " " + value_of(o);
         if (!o->get_default_str().empty()) out += "=" + o->get_default_str();
         return out + (o->get_required() ? " (needed)" : "");
@@ -76,7 +85,7 @@ Command table_of(const CLI::App& app)
 {
     Command c{app.get_name(), app.get_description(), {}, {}};
     for (const CLI::Option* o : app.get_options([](const CLI::Option* o) { return !o->get_group().empty(); })) {
-        Item item{{}, value_of(o), o->get_description(), o->get_group(), o->get_expected_min() == 0};
+        Item item{{}, value_of(o), o->get_description(), o->get_group(), takes_optional_value(o)};
         for (const auto& n : o->get_lnames()) item.names.push_back("--" + n);
         for (const auto& n : o->get_snames()) item.names.push_back("-" + n);
         if (o->get_positional()) item.names = {o->get_name(true)}, item.value = item.names[0];
@@ -167,7 +176,7 @@ std::string zsh(const Command& program, const std::vector<Command>& commands)
         std::string out;
         for (const Item& o : c.options)
             for (const auto& n : o.names) {
-                out += fmt::format(" \\\n            '*{}[{}]", n, text(o.doc));
+                out += fmt::format(" \\\n            '*{}{}[{}]", n, o.optional_value ? "=-" : "", text(o.doc));
                 if (!o.value.empty()) out += fmt::format("{}{}:{}", o.optional_value ? "::" : ":", text(o.value), takes(o));
                 out += '\'';
             }
@@ -248,7 +257,7 @@ std::string manual(const Command& program, const std::vector<Command>& commands)
             for (const Item& o : *items) {
                 out += ".TP\n.B " + text(fmt::format("{}", fmt::join(o.names, ", ")));
                 if (items == &c.options && !o.value.empty())
-                    out += (o.optional_value ? " \\fR[\\fI" + text(o.value) + "\\fR]" : " \\fI" + text(o.value));
+                    out += (o.optional_value ? "\\fR[=\\fI" + text(o.value) + "\\fR]" : " \\fI" + text(o.value));
                 out += "\n" + text(o.doc) + "\n";
             }
     }

@@ -2,7 +2,11 @@
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <fmt/format.h>
+#include <system_error>
 
 using namespace kuzure;
 
@@ -25,7 +29,7 @@ Exit codes: 0 done, 2 command line or scene wrong (nothing written), 3 the numbe
 int main(int argc, char** argv)
 {
     CLI::App app{"kuzure: soil that collapses under its own weight"};
-    app.set_version_flag("--version", version_text());
+    app.set_version_flag("--version", version_text() + "\n" + packages_text());
     app.require_subcommand(1);
     fit_help_to_screen(app);
     Action chosen;
@@ -57,13 +61,21 @@ int main(int argc, char** argv)
     };
     try {
         require_one_instruction_set(comm);
-        return int(chosen(comm));
+        const Exit code = chosen(comm);
+        // What a command says is what it is for; a run's results are in its directory.
+        if (speaks && !app.got_subcommand("run") && (std::fflush(stdout) != 0 || std::ferror(stdout)))
+            return fail(fmt::format("standard output could not be written: {}", std::strerror(errno)).c_str(), Exit::IoFailed);
+        return int(code);
     } catch (const BadInput& e) {
         return fail(e.what(), Exit::BadInput);
     } catch (const NumbersFailed& e) {
         return fail(e.what(), Exit::NumbersFailed);
     } catch (const IoFailed& e) {
         return fail(e.what(), Exit::IoFailed);
+    } catch (const std::system_error& e) { // of files, or of standard output
+        std::fprintf(stderr, "kuzure: %s\n", e.what());
+        if (comm.size() > 1) comm.abort(int(Exit::IoFailed));
+        return int(Exit::IoFailed);
     } catch (const std::bad_alloc&) {
         std::fprintf(stderr, "kuzure: rank %d has no more memory. Remedy: more ranks on more nodes, a larger spacing\n", comm.rank());
         comm.abort(int(Exit::IoFailed));

@@ -138,7 +138,25 @@ try:
     check(a["state_hash"] == b["state_hash"] and a["pairs"] == b["pairs"], "a stopped and restarted run has the bits of an undisturbed one")
     for key in a["energy"]:
         check(a["energy"][key] == b["energy"][key], f"the restart keeps the ledger: {key}")
-    call("run", scene, "-o", "stop", "--quiet", "--restart", "--set", "soil.sand.young=2e6", expect=2)
+    other = call("run", scene, "-o", "stop", "--quiet", "--restart", "--set", "soil.sand.young=2e6", expect=2)
+    check("soil.0.young: 1800000.0 there, 2000000.0 here" in other.stderr, "a restart with other physics names the key and both values")
+    # ---- after a restart the checkpoint it came from is the last good one
+    doomed = ("--set", "space.low=[-1,-1,-1]", "--set", "space.high=[1,1,1]", "--set", "body.0.velocity=[3,0,0]")
+    call("run", scene, "-o", "doomed", "--quiet", *doomed, "--set", "time.end=0.01")
+    left = call("run", scene, "-o", "doomed", "--quiet", *doomed, "--set", "time.end=1", "--restart", expect=3)
+    check("The last good checkpoint is doomed/checkpoint.h5" in left.stderr, "after a restart the checkpoint it began with is named")
+    # ---- FILE of --restart: only after "=", and never among the results of another scene
+    first = call("run", "--restart", scene, "-o", "fresh", "--quiet", "--set", "time.end=0.001")
+    check(first.returncode == 0 and os.path.exists(work + "/fresh/summary.json"), "--restart does not take the scene for its FILE")
+    before = {name: open(name, "rb").read() for name in glob.glob(work + "/doomed/*") if os.path.isfile(name)}
+    mixed = call("run", scene, "-o", "doomed", "--quiet", "--restart=stop/checkpoint.h5", "--set", "time.end=1", expect=2)
+    check("another scene" in mixed.stderr, "a checkpoint does not go on among the results of another scene")
+    check(all(open(name, "rb").read() == data for name, data in before.items()), "they stay as they were")
+    # ---- words that cannot be written
+    for words in (("check", scene), ("check", scene, "--json"), ("job", scene, "--machine", "slurm", "--nodes", "1"), ("reference",)):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([program, *words], cwd=work, stdout=full, stderr=subprocess.PIPE, text=True)
+        check(done.returncode == 4 and "defect" not in done.stderr, f"kuzure {words[0]} into a full disk is exit 4, found {done.returncode}")
     # ---- a damaged checkpoint
     path = work + "/straight/checkpoint.h5"
     data = bytearray(open(path, "rb").read())
@@ -152,7 +170,13 @@ try:
     check("<svg" in page and "data:image/png" in page and "://" not in page.split("<h2>Scene")[0], "report.html is self-contained")
     call("report", "nowhere", expect=2)
     version = call("--version").stdout
-    check("kuzure" in version and "GCC" in version, "--version tells program and compiler")
+    check(all(word in version for word in ("kuzure", "GCC", "MPI", "HDF5", "METIS")), "--version tells program, compiler and packages")
+    # ---- without output.history: the first and the last state
+    silent = "".join(line for line in open(scene) if not line.startswith(("history", "every")))
+    open(work + "/silent.toml", "w").write(silent)
+    call("run", work + "/silent.toml", "-o", "silent", "--quiet", "--set", "time.end=0.001")
+    rows = [row.split(",")[0] for row in open(work + "/silent/history.csv") if row[0].isdigit()]
+    check(rows == ["0", "0.001"], f"without output.history the first and the last row are written, found {rows}")
 finally:
     shutil.rmtree(work, ignore_errors=True)
 print(f"{len(failures)} failures")

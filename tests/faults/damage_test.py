@@ -61,6 +61,20 @@ with Place("damage") as place:
         done = place.run(whole, "both", "--restart", ranks=ranks, expect=4)
         check("both/checkpoint.h5" in done.stderr and "both/checkpoint.prev.h5" in done.stderr, "two damaged checkpoints are both named")
     check(not os.path.exists(place("both.old-1")), "with two damaged checkpoints nothing is moved aside")
+    # Going on from the previous generation keeps it: the damaged newer one is set aside, not moved over it.
+    shutil.copytree(place("half"), place("older"))
+    flip(place("older", "checkpoint.h5"), 8 * (size // 2))
+    good = open(place("older", "checkpoint.prev.h5"), "rb").read()
+    place.run(whole, "older", "--restart", "--max-minutes", "1e-9", expect=5)
+    check(open(place("older", "checkpoint.prev.h5"), "rb").read() == good, "the checkpoint gone on from is the previous generation")
+    check(os.path.exists(place("older", "checkpoint.damaged.h5")), "the damaged one is kept aside")
+    # A whole checkpoint that had not got its name when the machine went down gets it.
+    shutil.copytree(place("half"), place("unnamed"))
+    os.rename(place("unnamed", "checkpoint.h5"), place("unnamed", "checkpoint.h5.tmp"))
+    newest = open(place("unnamed", "checkpoint.h5.tmp"), "rb").read()
+    place.run(whole, "unnamed", "--restart", "--max-minutes", "1e-9", expect=5)
+    check(open(place("unnamed", "checkpoint.prev.h5"), "rb").read() == newest, "an unnamed checkpoint becomes a generation")
+
     # A file that is none, and one of another scene.
     done = place.run(whole, "x", f"--restart={whole}", expect=4)
     check("whole.toml" in done.stderr, "a checkpoint that is a scene is named")

@@ -128,5 +128,5 @@ TEST_F(PictureTest, TextKeepsInsideTheCanvas)
 TEST_F(PictureTest, AFailureIsAnIoFailure)
 {
     const auto box = io::soil_extent(alone, p);
-    EXPECT_THROW(io::write_picture(alone, dir / "none" / "p.png", p, walls, {{}, 3, box.low, box.high, d, "", 0, {}, 80, 45}), IoFailed);
+    EXPECT_THROW(io::write_picture(alone, dir / "none" / "p.png", p, walls, {{}, 3, box.low, box.high, d, "", 0, {}}), IoFailed);
 }

@@ -307,7 +307,9 @@ TEST(Dial, ReadsErrorsAndLayersOffACurve)
 TEST(Dial, ProposesTheCheapestThatReachesTheError)
 {
     const auto scene = block(0.1, "", 3);
-    const auto cost = [](const Scene& s) { return std::pow(s.space.spacing, -4) * (s.accuracy.preset == scene::Preset::Fast ? 0.01 : 1); };
+    const auto cost = [](const scene::Ready& r) {
+        return std::pow(r.scene.space.spacing, -4) * (r.scene.accuracy.preset == scene::Preset::Fast ? 0.01 : 1);
+    };
     const auto coarse = propose(scene, 0.15, read_measured(table_text), cost);
     EXPECT_EQ(coarse.preset, "fast");
     const auto fine = propose(scene, 0.05, read_measured(table_text), cost);
@@ -315,11 +317,11 @@ TEST(Dial, ProposesTheCheapestThatReachesTheError)
     EXPECT_LE(fine.expected, 0.05);
     EXPECT_LE(fine.low, fine.expected);
     EXPECT_GE(fine.high, fine.expected);
-    EXPECT_LE(fine.scene.space.spacing, 0.8 / 25.6);
-    EXPECT_TRUE(scene::Filling::problems(fine.scene).empty());
+    EXPECT_LE(fine.ready->scene.space.spacing, 0.8 / 25.6);
+    EXPECT_TRUE(scene::Filling::problems(fine.ready->scene).empty());
     EXPECT_EQ(fine.nearest, "cube");
     EXPECT_LT(fine.distance, 0.1);
-    EXPECT_THAT(to_text(fine, 0.05), HasSubstr("preset = \"standard\""));
+    EXPECT_THAT(to_text(fine, 0.05, 12), HasSubstr("preset = \"standard\""));
     // Another kind of scene is told from this one.
     std::string why;
     EXPECT_GE(distance(likeness(block(0.1)), read_measured(table_text)[0].about, &why), 1);

@@ -26,7 +26,7 @@ TEST(Elastic, PlateStaysInOnePiece)
     Case c("SPH-5-long");
     const auto s = swing(c, 6, 0.05, 5);
     EXPECT_TRUE(c.at_least("periods swung before it flies apart, H/dx = 6", s.swings, "1", 5,
-                           {.note = fmt::format("flew apart at t = {:.4g} s, cause not found", s.failed_at), .achieved = 1}));
+                           {.note = s.failed_at > 0 ? fmt::format("flew apart at t = {:.4g} s, cause not found", s.failed_at) : ""}));
     c.report("pieces at the end", s.pieces, "1");
 }
 

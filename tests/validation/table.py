@@ -25,7 +25,7 @@ tests/validation/validate.sh --publish  # and writes this page and its figures
 
 ## Closed forms in the unit tests
 
-`ctest --test-dir build/release -R 'drucker|pass|bits|contract' --output-on-failure` asserts these.
+`ctest --test-dir build/release -R 'drucker|pass|bits|contract' -LE long --output-on-failure` asserts these.
 
 | case | reference | tolerance asserted | where |
 |---|---|---|---|
@@ -98,7 +98,7 @@ def cell(text):
 def render(page, cases):
     """The page as text; figures are linked relative to where it will stand."""
     folder = os.path.relpath(FIGURES, os.path.dirname(os.path.abspath(page)))
-    gates = [r for c in cases.values() for r in c.values() if r["passed"] is not None]
+    gates = [r for c in cases.values() for r in c.values() if r["passed"] is not None and r["tolerance"] != "reported"]
     missed = [r for r in gates if not r["passed"]]
     text = [INTRO, f"## Measured\n\n{len(gates)} gates, {len(gates) - len(missed)} met, {len(missed)} missed; {sum(len(c) for c in cases.values())} rows.\n"]
     if missed:
@@ -132,7 +132,7 @@ def draw_closed_forms():
     column = os.path.join(RESULTS, "SPH-7_stress.csv")
     if os.path.exists(column):
         drawn["SPH-7"] = figure("sph_7_column", f"""set xlabel 'stress (kPa)'; set ylabel 'height (m)'; set key left top
-set title 'SPH-7: elastic column at rest, 10, 20, 50 and 100 spacings'
+set title 'SPH-7: elastic column at rest, 10 and 50 spacings'
 plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' title 'closed form, -rho g d', \\
   '' every ::1 using ($1==10?$3/1e3:NaN):2 pt 7 ps 1.0 lc rgb '{COLOURS[1]}' title 'sigma_z, 10 spacings', \\
   '' every ::1 using ($1==50?$3/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[0]}' title 'sigma_z, 50 spacings', \\

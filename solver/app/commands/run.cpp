@@ -157,7 +157,8 @@ private:
     void say(const std::string& text)
     {
         if (status_) status_->make_room();
-        if (speaks_) fmt::print("{}\n", text), std::fflush(stdout);
+        // Not by fmt, which throws: a run goes on when nobody can read what it says.
+        if (speaks_) std::fputs((text + "\n").c_str(), stdout), std::fflush(stdout);
     }
 
     void warn(const std::string& text)
@@ -176,7 +177,7 @@ private:
             else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
-        if (from) require_same_scene(*from, hash_);
+        if (from) require_same_scene(comm_, *from, scene_), require_room_for(*from, where);
         RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
         const double done = from ? std::clamp(clock_from(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
         const Estimate e = estimate(scene_, *filling_, *choose_model(scene_, options.arithmetic));
@@ -190,6 +191,7 @@ private:
             const Clock clock = clock_from(from->header, from->file);
             restart_time = clock.time;
             dir_.emplace(comm_, where, io::Existing::GoOn);
+            checkpoint_ = io::keep_generation(comm_, *from);
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
             if (const auto writer = other_writer(*from); !writer.empty())
@@ -218,6 +220,27 @@ private:
         say(fmt::format("predicted: {}", forecast_text(forecast_)));
     }
 
+    /// A run goes on where its own scene left results, or where nothing is yet: never among those of another. Throws BadInput.
+    void require_room_for(const io::Checkpoint& from, const io::Path& where)
+    {
+        io::on_root(comm_, [&] {
+            std::error_code error;
+            if (!std::filesystem::exists(where, error) || std::filesystem::is_empty(where, error) ||
+                std::filesystem::equivalent(where, io::directory_of(from.file), error))
+                return;
+            std::string found = "no scene.toml";
+            if (std::filesystem::exists(where / "scene.toml", error)) {
+                found = "the results of another scene";
+                try {
+                    if (io::scene_hash(io::read_scene(where / "scene.toml", {}, scene::StepLimit::Force)) == hash_) return;
+                } catch (const std::runtime_error&) { // of another version: not this run's
+                }
+            }
+            throw BadInput(fmt::format("{}: expected nothing, or results of this scene, to go on from {}; found {}. Choose another with -o",
+                                       where.string(), from.file.string(), found));
+        });
+    }
+
     /// Before anything is allocated or written: a run that must end with full memory or a full disk does not begin.
     void fits_or_throw(const Estimate& e, const io::Path& where, double done)
     {
@@ -240,7 +263,7 @@ private:
         Simulation& sim = *sim_;
         const double t = sim.time();
         if (before < 0 || last || due(scene_.time.end / 400, t, before)) log_progress();
-        if (due(scene_.output.history, t, before) || last) {
+        if (due(scene_.output.history, t, before) || last || before < 0) {
             if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(); });
         }
         if (due(scene_.output.every, t, before) || last || before < 0) {
@@ -473,8 +496,10 @@ private:
                     look(true);
                     write_summary("stopped", Exit::Stopped);
                     write_report();
-                    say(fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim.time(),
-                                    sim.steps(), checkpoint_.string()));
+                    const auto text = fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)",
+                                                  sim.time(), sim.steps(), checkpoint_.string());
+                    if (args_.quiet && comm_.rank() == 0) std::fprintf(stderr, "kuzure: %s\n", text.c_str());
+                    say(text);
                     return Exit::Stopped;
                 }
                 if (w.checkpoint) write_checkpoint();
@@ -546,16 +571,24 @@ void add_run(CLI::App& app, Action& chosen)
     auto* command = app.add_subcommand("run", "simulate a scene");
     auto a = std::make_shared<Arguments>();
     a->scene.add_to(*command);
-    command->add_option("-o,--output", a->output, "result directory (default: [output] directory, or results/<scene>)")->type_name("DIR");
-    auto* restart = command->add_option("--restart", a->restart, "go on from the newest good checkpoint of the directory, or from FILE")
-                        ->type_name("FILE")
-                        ->expected(0, 1)
-                        ->default_str("");
+    command->add_option("-o,--output", a->output, "result directory (default: [output] directory, or results/<scene>)")
+        ->type_name("DIR")
+        ->check([](const std::string& name) { return name.empty() ? "expected a directory, found \"\"" : ""; }, "");
+    auto restart = std::make_shared<std::string>();
+    auto* restarts =
+        command->add_flag("--restart{newest}", *restart, "go on from the newest good checkpoint of the directory, or from FILE");
     command->add_option("--threads", a->threads, "threads of each rank (default: the node's cores shared by its ranks)")
         ->check(CLI::Range(1, 4096));
     command->add_option("--max-minutes", a->max_minutes, "stop with a checkpoint and exit code 5 after so many minutes")
-        ->check(CLI::PositiveNumber);
-    command->add_flag("--quiet", a->quiet, "print nothing but errors");
+        ->check(
+            [](const std::string& text) {
+                double minutes = 0;
+                return CLI::detail::lexical_cast(text, minutes) && minutes > 0 && std::isfinite(minutes)
+                           ? ""
+                           : fmt::format("expected minutes above 0, such as 90 or 0.5, found \"{}\"", text);
+            },
+            "");
+    command->add_flag("--quiet", a->quiet, "print nothing but errors, warnings, and where a stopped run left its checkpoint");
     command->add_flag("--force", a->force, "move an existing result directory aside");
     command->add_flag("--force-size", a->force_size, "start although memory or disk will not be enough by kuzure's estimate");
     command->add_flag("--twins", a->twins, "first the same at 2 and 4 times the spacing: error bars on run-out, height and peak speed");
@@ -567,7 +600,7 @@ void add_run(CLI::App& app, Action& chosen)
     under_heading(*command, "Start and stop", {"--restart", "--max-minutes"});
     under_heading(*command, "Machine", {"--threads", "--force-size"});
     command->callback([=, &chosen] {
-        if (restart->count() > 0 && !a->restart) a->restart = "";
+        if (restarts->count() > 0) a->restart = *restart == "newest" ? "" : *restart;
         chosen = [=](const Comm& comm) { return Run(comm, *a).go(); };
     });
 }

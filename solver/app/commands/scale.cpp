@@ -43,7 +43,7 @@ State state_of(const Comm& comm, const Scene& s, const io::Path& from)
     const auto found = directory ? io::newest_good(comm, from, say) : io::verify_checkpoint(comm, from);
     if (!found)
         throw BadInput(fmt::format("--from {}: expected a checkpoint or a result directory that holds one, found none", from.string()));
-    require_same_scene(*found, io::scene_hash(s));
+    require_same_scene(comm, *found, s);
     Particles p;
     io::read_checkpoint(comm, found->file, p);
     std::vector<Vector> x(std::size_t(p.size())), way(x.size());

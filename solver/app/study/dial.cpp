@@ -2,7 +2,6 @@
 #include "io/scene_file.hpp"
 #include "io/scene_keys.hpp"
 #include "solver/core/ensure.hpp"
-#include "solver/scene/check.hpp"
 #include "solver/scene/fill.hpp"
 #include <algorithm>
 #include <charconv>
@@ -11,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
-#include <optional>
 #include <set>
 
 namespace kuzure::study {
@@ -30,7 +28,7 @@ double slope(const MeasuredPoint& a, const MeasuredPoint& b)
 }
 
 /// The scene with a preset's keys and a spacing, resolved; nothing where it breaks a rule.
-std::optional<Scene> with(const Scene& scene, const io::Preset& preset, double spacing)
+std::optional<scene::Ready> with(const Scene& scene, const io::Preset& preset, double spacing)
 {
     Scene s = scene;
     // The preset's keys by the reader itself, so that they mean what they mean in a file.
@@ -38,7 +36,7 @@ std::optional<Scene> with(const Scene& scene, const io::Preset& preset, double s
     for (const auto& [key, value] : preset.settings) sets.push_back(key + "=" + value);
     if (scene.time.step) s.time.step.reset();
     try {
-        return io::parse_scene(io::write_scene(s), "proposal", sets);
+        return io::parse_ready_scene(io::write_scene(s), "proposal", sets, scene::StepLimit::Enforce);
     } catch (const BadInput&) {
         return {};
     }
@@ -130,7 +128,8 @@ double distance(const Likeness& a, const Likeness& b, std::string* why)
     return std::sqrt(sum);
 }
 
-Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCurve>& table, const std::function<double(const Scene&)>& cost)
+Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCurve>& table,
+                 const std::function<double(const scene::Ready&)>& work)
 {
     const Likeness here = likeness(scene);
     const double height = here.layers * scene.space.spacing;
@@ -149,19 +148,19 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
         for (int a = 1; a <= 16; ++a)
             for (int b = 1; b <= 64; ++b)
                 if (std::gcd(a, b) == 1 && scene.space.spacing * a / b <= wanted * (1 + 1e-9)) spacings.insert(scene.space.spacing * a / b);
-        std::optional<Scene> proposed;
+        std::optional<scene::Ready> proposed;
         for (const double spacing : spacings)
             if (spacing > 0.5 * wanted && (proposed = with(scene, preset, spacing))) break;
         if (!proposed) continue;
         Proposal p;
         p.preset = preset.name;
-        const double layers = height / proposed->space.spacing;
+        const double layers = height / proposed->scene.space.spacing;
         p.expected = error_at(*nearest, layers), p.low = p.high = p.expected;
         for (const auto* c : curves) p.low = std::min(p.low, error_at(*c, layers)), p.high = std::max(p.high, error_at(*c, layers));
         p.nearest = nearest->scene;
         p.distance = distance(here, nearest->about, &p.difference);
         p.least_layers = nearest->points.front().layers, p.most_layers = nearest->points.back().layers;
-        p.cost = cost(*proposed);
+        p.work = work(*proposed);
         if (layers > p.most_layers * 1.01)
             p.note =
                 fmt::format("{:.0f} layers are more than the {:.0f} that were measured: the error is extrapolated", layers, p.most_layers);
@@ -169,8 +168,9 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
             p.note = fmt::format("{:.0f} layers are fewer than the {:.0f} that were measured: the error is extrapolated", layers,
                                  p.least_layers);
         if (scene.time.step) p.note += std::string(p.note.empty() ? "" : "; ") + "leave time.step out: the step then goes with the spacing";
-        p.scene = std::move(*proposed);
-        if (!best || p.cost < best->cost) best = std::move(p);
+        if (best && p.work >= best->work) continue;
+        p.ready = std::move(proposed);
+        best = std::move(p);
     }
     if (!best)
         throw BadInput(
@@ -181,16 +181,16 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
     return *best;
 }
 
-std::string to_text(const Proposal& p, double wanted)
+std::string to_text(const Proposal& p, double wanted, double seconds)
 {
     std::string out = fmt::format("accuracy {:g} % of the heap's profile: proposed\n\n", 100 * wanted);
-    out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.scene.space.spacing, p.preset);
+    out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.ready->scene.space.spacing, p.preset);
     out += fmt::format("  expected error {:.2g} %; over all measured scenes {:.2g} to {:.2g} %\n", 100 * p.expected, 100 * p.low,
                        100 * p.high);
-    const auto [of, unit] = p.cost < 100    ? std::pair{1.0, "seconds"}
-                            : p.cost < 6000 ? std::pair{60.0, "minutes"}
-                                            : std::pair{3600.0, "hours"};
-    out += fmt::format("  time           about {:.3g} {} on this machine\n", p.cost / of, unit);
+    const auto [of, unit] = seconds < 100    ? std::pair{1.0, "seconds"}
+                            : seconds < 6000 ? std::pair{60.0, "minutes"}
+                                             : std::pair{3600.0, "hours"};
+    out += fmt::format("  time           about {:.3g} {} on this machine\n", seconds / of, unit);
     out += fmt::format("  rests on       \"{}\"{}\n", p.nearest,
                        p.distance < 0.1
                            ? std::string(", a scene like this one")
@@ -199,21 +199,25 @@ std::string to_text(const Proposal& p, double wanted)
                                              ? ": another kind of scene, so take the error as a guess and let kuzure run --twins judge it"
                                              : ""));
     if (!p.note.empty()) out += "  note           " + p.note + "\n";
+    for (const auto& w : p.ready->warnings) out += fmt::format("  warning        {}: {}\n", w.key, w.text);
     return out;
 }
 
-nlohmann::ordered_json to_json(const Proposal& p, double wanted)
+nlohmann::ordered_json to_json(const Proposal& p, double wanted, double seconds)
 {
+    auto warnings = nlohmann::ordered_json::array();
+    for (const auto& w : p.ready->warnings) warnings.push_back(w.key + ": " + w.text);
     return {{"wanted", wanted},
             {"preset", p.preset},
-            {"spacing", p.scene.space.spacing},
+            {"spacing", p.ready->scene.space.spacing},
             {"expected_error", p.expected},
             {"error_interval", {p.low, p.high}},
-            {"predicted_seconds", p.cost},
+            {"predicted_seconds", seconds},
             {"nearest", p.nearest},
             {"distance", p.distance},
             {"difference", p.difference},
-            {"note", p.note}};
+            {"note", p.note},
+            {"warnings", std::move(warnings)}};
 }
 
 double parse_accuracy(const std::string& text)

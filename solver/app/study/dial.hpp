@@ -1,8 +1,9 @@
 #pragma once
 // From a wanted error to settings: read off the table of measured studies (measured.inl, made by jobs/studies/publish.py).
-#include "solver/scene/scene.hpp"
+#include "solver/scene/check.hpp"
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,21 +44,21 @@ double distance(const Likeness& scene, const Likeness& measured, std::string* wh
 
 struct Proposal {
     std::string preset;
-    Scene scene;                     // with the proposed spacing and keys
-    double expected = 0;             // error, 1
-    double low = 0, high = 0;        // of all measured scenes
-    double cost = 0;                 // as `cost` gave it
-    std::string nearest, difference; // the measured scene it rests on, and how that differs
+    std::optional<scene::Ready> ready; // the scene with the proposed spacing and keys, and its warnings
+    double expected = 0;               // error, 1
+    double low = 0, high = 0;          // of all measured scenes
+    double work = 0;                   // as `work` gave it
+    std::string nearest, difference;   // the measured scene it rests on, and how that differs
     double distance = 0;
     double least_layers = 0, most_layers = 0; // measured; beyond them the error is an extrapolation
     std::string note;                         // what could not be had
 };
-/// The cheapest settings that reach the error on this scene, by `cost`. Spacings are tried that fill its bodies whole; fixed steps
+/// The settings that reach the error on this scene with the least work. Spacings are tried that fill its bodies whole; fixed steps
 /// go with the smoothing length. Throws BadInput where none is found.
-Proposal propose(const Scene&, double error, const std::vector<MeasuredCurve>&, const std::function<double(const Scene&)>& cost);
-/// For the terminal, and for --json.
-std::string to_text(const Proposal&, double wanted);
-nlohmann::ordered_json to_json(const Proposal&, double wanted);
+Proposal propose(const Scene&, double error, const std::vector<MeasuredCurve>&, const std::function<double(const scene::Ready&)>& work);
+/// For the terminal, and for --json; with the seconds that it will take here.
+std::string to_text(const Proposal&, double wanted, double seconds);
+nlohmann::ordered_json to_json(const Proposal&, double wanted, double seconds);
 
 /// "5%", "5 %" or "0.05" as 0.05. Throws BadInput.
 double parse_accuracy(const std::string&);
