@@ -90,8 +90,7 @@ def curves(study):
         if measure in ("residual", "settlement") or reference["from"].startswith(("experiment", "none")):
             continue
         # At the spacing of the run that errors count from, they say how near the presets are to each other, not to the truth.
-        own = re.match(r'the finest run of "\w+", ([0-9.e-]+) m', reference["from"])
-        coarser_than = float(own[1]) * (1 + 1e-9) if own else 0
+        coarser_than = reference["spacing"] * (1 + 1e-9)
         for preset in PRESETS:
             points = [(about["height"] / p["spacing"], p["errors"][measure]) for p in study["points"]
                       if p["spacing"] > coarser_than and p["curve"] == preset and not p["choice"] and p["exit_code"] == 0 and p["errors"][measure]]

@@ -52,7 +52,7 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
     for (const auto& curve : study.curves()) {
         std::string block;
         for (const Point* p : study.along(curve))
-            if (std::isfinite(p->error[k]) && p->error[k] > 0) {
+            if (study.tells(*p, m)) {
                 block += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", p->core_seconds, p->pairs, 100 * p->error[k], p->spacing);
                 least = std::min(least, 100 * p->error[k]), most = std::max(most, 100 * p->error[k]);
             }
@@ -72,14 +72,15 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
     }
     io::write_atomically(folder / (name + ".dat"), data);
 
-    std::string c = fmt::format("set multiplot layout 1,2 title {}\nset logscale xy\nset format x '10^{{%T}}'\nset ylabel 'error of {} "
-                                "(%)'\nset yrange [{:.3g}:{:.3g}]\n",
-                                in_quotes(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
-                                0.5 * std::min(least, 1.0), 2 * std::max(most, 5.0));
+    std::string c =
+        fmt::format("set multiplot layout 1,2 title {}\nset logscale xy\nset format x '10^{{%T}}'\nset bmargin 10\nset ylabel 'error of {} "
+                    "(%)'\nset yrange [{:.3g}:{:.3g}]\n",
+                    in_quotes(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
+                    0.5 * std::min(least, 1.0), 2 * std::max(most, 5.0));
     const double scatter = 100 * study.sweep.reference.scatter;
     for (const bool pairs : {false, true}) {
         c += fmt::format("set xlabel '{}'\n", pairs ? "pair interactions" : "core-seconds");
-        c += pairs ? "unset key\n" : "set key opaque bottom left Left reverse samplen 1.5 spacing 1.1 font ',9'\n";
+        c += pairs ? "unset key\n" : "set key at graph 0,-0.17 left top Left reverse samplen 1.5 spacing 1.1 font ',9' maxcols 1\n";
         if (!pairs) c += "set format x '%g'\n";
         else c += "set format x '%.0e'\n";
         std::string plots;
@@ -102,7 +103,7 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
         c += plots + "\n";
     }
     c += "unset multiplot\n";
-    return both(name, 1100, 520, c);
+    return both(name, 1100, 580, c);
 }
 
 /// What each [[point]] costs against the base: time ratio, and error change for the study's first measure.
@@ -126,12 +127,12 @@ std::string choice_figure(const Study& study, const io::Path& folder)
     io::write_atomically(folder / "choices.dat", data);
     std::string c = fmt::format(
         "set multiplot layout 1,2 title {}\nset style fill solid 0.85 noborder\nset yrange [{}:-0.7]\nunset key\nset grid noytics\n"
-        "set ytics scale 0\nset lmargin at screen 0.27; set rmargin at screen 0.60\nset xlabel 'time over that of the base'\nset xrange "
+        "set ytics scale 0\nset lmargin at screen 0.30; set rmargin at screen 0.61\nset xlabel 'time over that of the base'\nset xrange "
         "[0:{:.3g}]\n"
         "set arrow 1 from 1,-0.7 to 1,{} nohead lc rgb '#404040'\n"
         "plot 'choices.dat' u ($2/2):0:($2/2):(0.3):ytic(1) w boxxy lc rgb '#4477aa', '' u 2:0:(sprintf('  %.2f', $2)) w labels left\n",
         in_quotes(study.sweep.title + ": what each choice costs, against \"base\""), rows - 0.3, 1.25 * greatest, rows - 0.3);
-    c += fmt::format("unset arrow 1\nset lmargin at screen 0.66; set rmargin at screen 0.97\nset xlabel 'change of the error of {} "
+    c += fmt::format("unset arrow 1\nset lmargin at screen 0.67; set rmargin at screen 0.97\nset xlabel 'change of the error of {} "
                      "(percent points)'\nset xrange [{:.3g}:{:.3g}]\n"
                      "set ytics format ''\nset arrow 2 from 0,-0.7 to 0,{} nohead lc rgb '#404040'\n"
                      "plot 'choices.dat' u ($4/2):0:(abs($4)/2):(0.3) w boxxy lc rgb '#ee6677', '' u ($4>0?$4:0):0:(sprintf('  %+.2f', "

@@ -101,11 +101,17 @@ std::vector<const Point*> Study::along(const std::string& curve) const
     std::stable_sort(all.begin(), all.end(), [](const Point* a, const Point* b) { return a->spacing > b->spacing; });
     return all;
 }
+bool Study::tells(const Point& p, Measure m) const
+{
+    const double error = p.error[std::size_t(m)];
+    return std::isfinite(error) && error > 0 && p.spacing > reference_spacing[std::size_t(m)] * (1 + 1e-9);
+}
+
 std::vector<Price> Study::prices(const std::string& curve, Measure m, bool pairs) const
 {
     std::vector<Price> all;
     for (const Point* p : along(curve))
-        if (const double e = p->error[std::size_t(m)]; std::isfinite(e) && e > 0) all.push_back({pairs ? p->pairs : p->core_seconds, e});
+        if (tells(*p, m)) all.push_back({pairs ? p->pairs : p->core_seconds, p->error[std::size_t(m)]});
     return all;
 }
 const Point* Study::base() const
@@ -193,7 +199,7 @@ void compare(Study& study)
 {
     using Kind = io::SweepReference::Kind;
     const Kind kind = study.sweep.reference.kind;
-    study.reference.fill(unknown);
+    study.reference.fill(unknown), study.reference_spacing.fill(0);
     study.convergence.clear(), study.bars.clear();
     for (auto& note : study.reference_note) note.clear();
 
@@ -240,10 +246,11 @@ void compare(Study& study)
         } else if (finest) {
             note = fmt::format("the finest run of \"{}\", {:g} m", chosen, finest->spacing);
             study.reference[k] = is_error(m) ? unknown : finest->value[k];
+            study.reference_spacing[k] = finest->spacing;
             for (const auto& c : study.convergence)
                 if (c.curve == chosen && c.measure == m) {
                     if (c.result.order) {
-                        study.reference[k] = c.result.limit;
+                        study.reference[k] = c.result.limit, study.reference_spacing[k] = 0;
                         note = fmt::format("limit of \"{}\" by Richardson extrapolation, observed order {:.2f}", chosen, *c.result.order);
                     } else {
                         note += fmt::format("; no extrapolation: {}", c.result.why_not);
@@ -328,7 +335,8 @@ nlohmann::ordered_json to_json(const Study& study)
     j["measures"] = Json::object();
     for (const auto m : study.sweep.measures)
         j["measures"][names[std::size_t(m)]] = {{"reference", study.reference[std::size_t(m)]},
-                                                {"from", study.reference_note[std::size_t(m)]}};
+                                                {"from", study.reference_note[std::size_t(m)]},
+                                                {"spacing", study.reference_spacing[std::size_t(m)]}};
     j["scatter"] = study.sweep.reference.scatter;
     const Point* base = study.base();
     j["points"] = Json::array();
@@ -384,7 +392,7 @@ nlohmann::ordered_json to_json(const Study& study)
         std::vector<Price> all;
         std::vector<const Point*> who;
         for (const auto& p : study.points)
-            if (p.finished() && p.error[std::size_t(m)] > 0) all.push_back({p.core_seconds, p.error[std::size_t(m)]}), who.push_back(&p);
+            if (p.finished() && study.tells(p, m)) all.push_back({p.core_seconds, p.error[std::size_t(m)]}), who.push_back(&p);
         Json front = Json::array();
         for (const auto i : pareto_front(all))
             front.push_back(

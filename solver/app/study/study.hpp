@@ -54,6 +54,7 @@ struct Study {
     std::vector<std::array<double, 2>> experiment_failure;
     std::array<double, measure_count> reference{}; // by measure, in the unit of its values
     std::array<std::string, measure_count> reference_note;
+    std::array<double, measure_count> reference_spacing{}; // m, of the run that errors count from; 0: they count from something else
     std::vector<CurveConvergence> convergence;
     std::vector<ErrorBar> bars;
 
@@ -61,6 +62,9 @@ struct Study {
     std::vector<std::string> curves() const;
     /// Finished points of a curve, coarse to fine.
     std::vector<const Point*> along(const std::string& curve) const;
+    /// True if a point's error is there and says how far it is from the truth: at the spacing of the run that errors count from it
+    /// says how near the settings are to each other.
+    bool tells(const Point&, io::Measure) const;
     /// Costs (core-seconds or pairs) and errors of a curve.
     std::vector<Price> prices(const std::string& curve, io::Measure, bool pairs) const;
     const Point* base() const;
