@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Runs that are asked to stop: exit 5 on all ranks with a checkpoint, and on from there to the bits of the undisturbed run."""
-import os, signal, time
+import json, os, signal, time
 
 from faults import Place, check, end, history, same_results, scene_text, wait_for
 
@@ -67,9 +67,14 @@ with Place("stop") as place:
     whole = place.write("whole.toml", scene_text(end=0.03))
     place.run(whole, "calm")
     codes = []
-    while len(codes) < 40 and (not codes or codes[-1] == 5):
+    steps = [0]
+    while not codes or codes[-1] == 5:
         done = place.run(whole, "requeued", "--restart", "--max-minutes", "0.004", ranks=1 + len(codes) % 2, expect=(0, 5))
         codes.append(done.returncode)
+        # However slow the machine: every start gets further.
+        steps.append(json.load(open(place("requeued", "summary.json")))["steps"])
+        if not check(steps[-1] > steps[-2], f"start {len(codes)} goes on from step {steps[-2]} to {steps[-1]}"):
+            break
     check(codes[-1] == 0 and codes[:-1] == [5] * (len(codes) - 1) and len(codes) > 1, f"a requeued job comes to its end: exits {codes}")
     same_results(place, "requeued", "calm", f"a job requeued {len(codes) - 1} times")
 end()
