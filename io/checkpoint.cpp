@@ -259,7 +259,7 @@ Path keep_generation(const Team& team, const Checkpoint& good)
     const bool unnamed = good.file.filename() == unnamed_name, older = good.file.filename() == previous_name;
     if (unnamed || older)
         on_root(team, [&] {
-            if (std::filesystem::exists(newest)) move_file(newest, directory / "checkpoint.damaged.h5");
+            if (std::filesystem::exists(newest)) move_file(newest, directory / "checkpoint.aside.h5");
             if (unnamed) move_file(good.file, newest);
             sync(directory);
         });

@@ -36,9 +36,8 @@ Checkpoint read_checkpoint(const Team&, const Path& file, Particles&);
 /// Collective. Reads the whole checkpoint without keeping it. Throws IoFailed as read_checkpoint does.
 Checkpoint verify_checkpoint(const Team&, const Path& file);
 
-/// Collective. Makes sure that the next write_checkpoint into its directory keeps this good checkpoint, as found by newest_good: a
-/// whole one that had not got its name gets it, and a damaged newer one becomes checkpoint.damaged.h5. Gives where it is then.
-/// Throws IoFailed.
+/// Collective. Makes sure that the next write_checkpoint into its directory keeps this good checkpoint: a whole one that had not got its
+/// name gets it, and a newer one, damaged or not wanted, becomes checkpoint.aside.h5. Gives where it is then. Throws IoFailed.
 Path keep_generation(const Team&, const Checkpoint&);
 
 /// Collective. The newest checkpoint of the directory that passes verify_checkpoint, or nothing if there is

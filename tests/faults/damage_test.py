@@ -67,7 +67,7 @@ with Place("damage") as place:
     good = open(place("older", "checkpoint.prev.h5"), "rb").read()
     place.run(whole, "older", "--restart", "--max-minutes", "1e-9", expect=5)
     check(open(place("older", "checkpoint.prev.h5"), "rb").read() == good, "the checkpoint gone on from is the previous generation")
-    check(os.path.exists(place("older", "checkpoint.damaged.h5")), "the damaged one is kept aside")
+    check(os.path.exists(place("older", "checkpoint.aside.h5")), "the damaged one is kept aside")
     # A whole checkpoint that had not got its name when the machine went down gets it.
     shutil.copytree(place("half"), place("unnamed"))
     os.rename(place("unnamed", "checkpoint.h5"), place("unnamed", "checkpoint.h5.tmp"))

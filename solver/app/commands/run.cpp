@@ -191,7 +191,9 @@ private:
             const Clock clock = clock_from(from->header, from->file);
             restart_time = clock.time;
             dir_.emplace(comm_, where, io::Existing::GoOn);
-            checkpoint_ = io::keep_generation(comm_, *from);
+            std::error_code error; // of another directory nothing is touched
+            const bool here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file), error));
+            checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
             if (const auto writer = other_writer(*from); !writer.empty())
