@@ -144,7 +144,7 @@ plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' titl
     if tips:
         lines = ", ".join(f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 lc rgb '{COLOURS[k]}' title 'H/dx = {n}{', corrected gradient' if c else ''}'"
                           for k, ((n, c), p) in enumerate(sorted(tips.items())))
-        drawn["SPH-5"] = figure("sph_5_plate", f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key right top
+        drawn["SPH-5"] = figure("sph_5_plate", f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key center bottom
 set title 'SPH-5: plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
 set arrow from 0.127,graph 0 to 0.127,graph 1 nohead dt 2; set label 'T/2' at 0.129,graph 0.95
 plot {lines}
