@@ -21,6 +21,7 @@ using Block = std::array<std::int32_t, 3>;
 
 /// Blocks reach from -block_limit to block_limit - 1 on each axis.
 inline constexpr std::int32_t block_limit = 1 << 20;
+/// True if a block lies there.
 inline bool within_limit(const Block& b)
 {
     return std::ranges::all_of(b, [](std::int32_t c) { return c >= -block_limit && c < block_limit; });

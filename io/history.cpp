@@ -15,8 +15,7 @@ std::string units(int dimensions)
 }
 
 /// Shortest digits that read back to the same number. What is not there is written here: fmt compares it, which traps.
-std::string cell(double x) { return std::isnan(x) ? "nan" : fmt::format("{}", x); }
-std::string rounded(double x) { return std::isnan(x) ? "nan" : fmt::format("{:.4g}", x); }
+std::string cell(double x, fmt::format_string<double&> digits = "{}") { return std::isnan(x) ? "nan" : fmt::format(digits, x); }
 
 std::string text(const HistoryRow& r)
 {
@@ -29,7 +28,8 @@ std::string text(const HistoryRow& r)
 
 std::string text(const ProgressRow& r)
 {
-    return fmt::format("{},{},{},{:.3f},{},{}", cell(r.time), r.step, cell(r.dt), r.wall, rounded(r.steps_per_second), rounded(r.balance));
+    return fmt::format("{},{},{},{:.3f},{},{}", cell(r.time), r.step, cell(r.dt), r.wall, cell(r.steps_per_second, "{:.4g}"),
+                       cell(r.balance, "{:.4g}"));
 }
 
 } // namespace

@@ -130,10 +130,17 @@ Forecast forecast(const Comm& comm, const Scene& s, const scene::Filling& f, con
     return {all[0], all[1], all[2], all[3]};
 }
 
+TimeUnit unit_for(double seconds)
+{
+    if (seconds < 100) return {1, "seconds"};
+    if (seconds < 6000) return {60, "minutes"};
+    return {3600, "hours"};
+}
+
 std::string forecast_text(const Forecast& f)
 {
-    const auto in = f.high < 100 ? std::pair{1.0, "seconds"} : f.high < 6000 ? std::pair{60.0, "minutes"} : std::pair{3600.0, "hours"};
-    return fmt::format("{:.1f} {} ({:.1f} to {:.1f})", f.seconds / in.first, in.second, f.low / in.first, f.high / in.first);
+    const auto [of, unit] = unit_for(f.high);
+    return fmt::format("{:.1f} {} ({:.1f} to {:.1f})", f.seconds / of, unit, f.low / of, f.high / of);
 }
 
 } // namespace kuzure

@@ -13,6 +13,13 @@ struct Forecast {
 /// Collective; takes a second or less. `done` is the share that lies behind a restart. Uses the threads that are set.
 Forecast forecast(const Comm&, const Scene&, const scene::Filling&, const Estimate&, double done = 0);
 
+/// The unit in which a time is said, and how many seconds that is.
+struct TimeUnit {
+    double seconds;
+    const char* name;
+};
+TimeUnit unit_for(double seconds);
+
 /// "12.3 minutes (10.9 to 14.0)"
 std::string forecast_text(const Forecast&);
 

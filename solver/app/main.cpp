@@ -29,7 +29,7 @@ Exit codes: 0 done, 2 command line or scene wrong (nothing written), 3 the numbe
 int main(int argc, char** argv)
 {
     CLI::App app{"kuzure: soil that collapses under its own weight"};
-    app.set_version_flag("--version", version_text() + "\n" + packages_text());
+    app.set_version_flag("--version", [] { return version_text() + "\n" + packages_text(); });
     app.require_subcommand(1);
     fit_help_to_screen(app);
     Action chosen;

@@ -454,7 +454,7 @@ Filling::Filling(const Scene& scene) : Filling(scene, survey(scene)) {}
 Filling::Filling(const Scene& scene, Survey found) : n_bodies_(scene.bodies.size())
 {
     std::string errors;
-    for (const auto& issue : found.issues) errors += fmt::format("{}{}: {}", errors.empty() ? "" : "\n", issue.key, issue.text);
+    for (const auto& issue : found.issues) errors += (errors.empty() ? "" : "\n") + in_words(issue);
     if (!errors.empty()) throw BadInput(errors);
 
     first_id_ = {0};

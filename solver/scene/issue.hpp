@@ -14,4 +14,7 @@ struct Issue {
 };
 using Issues = std::vector<Issue>;
 
+/// "body.0.box: what was expected ..."
+inline std::string in_words(const Issue& issue) { return issue.key + ": " + issue.text; }
+
 } // namespace kuzure::scene

@@ -14,6 +14,7 @@
 #include <fstream>
 #include <gtest/gtest.h>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -109,6 +110,19 @@ inline Vector position(const Simulation& s, Index i) { return s.particles()[fiel
 inline Vector origin(const Simulation& s, Index i) { return s.particles()[field::origin][i]; }
 inline Vector velocity(const Simulation& s, Index i) { return s.particles()[field::velocity][i]; }
 inline Stress stress(const Simulation& s, Index i) { return s.particles()[field::stress][i]; }
+
+using Places = std::map<std::int64_t, Vector>; // by id, m
+inline Places places(const Simulation& s)
+{
+    Places x;
+    each(s, [&](Index i) { x[s.particles()[field::id][i]] = position(s, i); });
+    return x;
+}
+/// Ways of all particles from where they were, m, each handed to visit.
+template <class Visit> void each_way(const Simulation& s, const Places& from, Visit visit)
+{
+    each(s, [&](Index i) { visit(length(position(s, i) - from.at(s.particles()[field::id][i]))); });
+}
 
 inline double particle_mass(const Simulation& s, Index i)
 {

@@ -26,12 +26,6 @@ SceneText struck_ground(double sleep_below)
     t.end = 0.5;
     return t;
 }
-std::map<std::int64_t, Vector> places(const Simulation& sim)
-{
-    std::map<std::int64_t, Vector> x;
-    each(sim, [&](Index i) { x[sim.particles()[field::id][i]] = position(sim, i); });
-    return x;
-}
 double asleep(const Simulation& sim) { return double(sim.work_done().asleep) / double(sim.work_done().particle_steps); }
 
 } // namespace

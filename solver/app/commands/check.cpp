@@ -89,7 +89,7 @@ void add_check(CLI::App& app, Action& chosen)
                 time = forecast(comm, s, filling, e);
             }
             std::vector<std::string> warnings;
-            for (const auto& issue : doubts) warnings.push_back(issue.key + ": " + issue.text);
+            for (const auto& issue : doubts) warnings.push_back(in_words(issue));
             const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
             if (const auto why = machine->empty() ? does_not_fit(comm, e, where) : std::string(); !why.empty())
                 warnings.push_back("on this machine kuzure run would refuse this scene: " + why);

@@ -169,7 +169,7 @@ private:
 
     void open()
     {
-        for (const auto& issue : doubts_) warn(issue.key + ": " + issue.text);
+        for (const auto& issue : doubts_) warn(in_words(issue));
         const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
         if (args_.restart) {
@@ -177,7 +177,13 @@ private:
             else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
-        if (from) require_same_scene(comm_, *from, scene_), require_room_for(*from, where);
+        bool here = true; // of another directory nothing is touched
+        if (from) {
+            std::error_code error;
+            here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file), error));
+            require_same_scene(comm_, *from, scene_);
+            if (!here) require_room_for(*from, where);
+        }
         RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
         const double done = from ? std::clamp(clock_from(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
         const Estimate e = estimate(scene_, *filling_, *choose_model(scene_, options.arithmetic));
@@ -191,8 +197,6 @@ private:
             const Clock clock = clock_from(from->header, from->file);
             restart_time = clock.time;
             dir_.emplace(comm_, where, io::Existing::GoOn);
-            std::error_code error; // of another directory nothing is touched
-            const bool here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file), error));
             checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
@@ -222,14 +226,13 @@ private:
         say(fmt::format("predicted: {}", forecast_text(forecast_)));
     }
 
-    /// A run goes on where its own scene left results, or where nothing is yet: never among those of another. Throws BadInput.
+    /// A checkpoint of elsewhere goes on where its own scene left results, or where nothing is yet: never among those of another. Throws
+    /// BadInput.
     void require_room_for(const io::Checkpoint& from, const io::Path& where)
     {
         io::on_root(comm_, [&] {
             std::error_code error;
-            if (!std::filesystem::exists(where, error) || std::filesystem::is_empty(where, error) ||
-                std::filesystem::equivalent(where, io::directory_of(from.file), error))
-                return;
+            if (!std::filesystem::exists(where, error) || std::filesystem::is_empty(where, error)) return;
             std::string found = "no scene.toml";
             if (std::filesystem::exists(where / "scene.toml", error)) {
                 found = "the results of another scene";

@@ -1,6 +1,7 @@
 #include "solver/app/study/dial.hpp"
 #include "io/scene_file.hpp"
 #include "io/scene_keys.hpp"
+#include "solver/app/forecast.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/fill.hpp"
 #include <algorithm>
@@ -187,9 +188,7 @@ std::string to_text(const Proposal& p, double wanted, double seconds)
     out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.ready->scene.space.spacing, p.preset);
     out += fmt::format("  expected error {:.2g} %; over all measured scenes {:.2g} to {:.2g} %\n", 100 * p.expected, 100 * p.low,
                        100 * p.high);
-    const auto [of, unit] = seconds < 100    ? std::pair{1.0, "seconds"}
-                            : seconds < 6000 ? std::pair{60.0, "minutes"}
-                                             : std::pair{3600.0, "hours"};
+    const auto [of, unit] = unit_for(seconds);
     out += fmt::format("  time           about {:.3g} {} on this machine\n", seconds / of, unit);
     out += fmt::format("  rests on       \"{}\"{}\n", p.nearest,
                        p.distance < 0.1
@@ -199,14 +198,14 @@ std::string to_text(const Proposal& p, double wanted, double seconds)
                                              ? ": another kind of scene, so take the error as a guess and let kuzure run --twins judge it"
                                              : ""));
     if (!p.note.empty()) out += "  note           " + p.note + "\n";
-    for (const auto& w : p.ready->warnings) out += fmt::format("  warning        {}: {}\n", w.key, w.text);
+    for (const auto& w : p.ready->warnings) out += "  warning        " + in_words(w) + "\n";
     return out;
 }
 
 nlohmann::ordered_json to_json(const Proposal& p, double wanted, double seconds)
 {
     auto warnings = nlohmann::ordered_json::array();
-    for (const auto& w : p.ready->warnings) warnings.push_back(w.key + ": " + w.text);
+    for (const auto& w : p.ready->warnings) warnings.push_back(in_words(w));
     return {{"wanted", wanted},
             {"preset", p.preset},
             {"spacing", p.ready->scene.space.spacing},

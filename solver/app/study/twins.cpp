@@ -101,7 +101,7 @@ Twin coarsened(const Scene& scene, int factor)
     scene::resolve(s);
     std::string errors;
     for (const auto& issue : scene::check(s, scene::StepLimit::Force))
-        if (issue.severity == scene::Severity::Error) errors += (errors.empty() ? "" : "; ") + issue.key + ": " + issue.text;
+        if (issue.severity == scene::Severity::Error) errors += (errors.empty() ? "" : "; ") + in_words(issue);
     if (!errors.empty()) throw BadInput(fmt::format("the scene cannot be made {} times as coarse: {}", factor, errors));
     twin.soil_volume =
         double(scene::Filling(s).soil_count()) * s.particle_volume() / (double(filling.soil_count()) * scene.particle_volume());
