@@ -1,7 +1,7 @@
 // The pair pass against the textbook, lane by lane: every compiled model, on lattice, jitter, disorder, free surface and
 // hard arrangements.
 #include "perf/bench/cloud.hpp"
-#include "solver/kernels/pass_impl.hpp"
+#include "solver/kernels/leap_frog.hpp"
 #include "solver/kernels/variants.hpp"
 #include "solver/scene/scene.hpp"
 #include <gtest/gtest.h>
@@ -199,7 +199,7 @@ TEST(Pass, PlainLoopGivesTheTextbooksSums)
     for (const Scene& s : scenes())
         for (int kind = 0; kind < 4; ++kind) {
             Cloud c = arrangement(kind, s);
-            const auto model = choose_model(s, Arithmetic::Plain);
+            const auto model = choose_model(s, Arithmetic::Scalar);
             c.sort();
             const Reference ref = by_the_book(c);
             Cloud after = c;
@@ -235,7 +235,7 @@ TEST(Pass, StressDiffusionIsTheTextbooks)
         bare.effects.stress_diffusion->zeta = 0;
         Cloud without = arrangement(1, bare);
         const double kick = 1e-5;
-        const auto model = choose_model(s, Arithmetic::Lanes), same = choose_model(bare, Arithmetic::Lanes);
+        const auto model = choose_model(s, Arithmetic::Simd), same = choose_model(bare, Arithmetic::Simd);
         Cloud c = with_it;
         c.sort();
         run<double>(*model, with_it, 0.1, 0, kick);
@@ -278,7 +278,7 @@ TEST(Pass, AnEffectOfStrengthZeroChangesNoBit)
         idle[5].effects.pore_pressure = scene::PorePressure{{{0.0, -1e3}}, 1000};
         for (std::size_t k = 0; k < idle.size(); ++k) {
             Cloud a = arrangement(1, bare), b = arrangement(1, idle[k]);
-            const auto plain = choose_model(bare, Arithmetic::Lanes), full = choose_model(idle[k], Arithmetic::Lanes);
+            const auto plain = choose_model(bare, Arithmetic::Simd), full = choose_model(idle[k], Arithmetic::Simd);
             run<double>(*plain, a, 0.1, 1e-4, 1e-4);
             run<double>(*full, b, 0.1, 1e-4, 1e-4);
             for (Index i = 0; i < a.particles.size(); ++i) {
@@ -294,7 +294,7 @@ TEST(Pass, LanesGiveThePlainLoopsBits)
     for (const Scene& s : scenes())
         for (int kind = 0; kind < 4; ++kind) {
             Cloud plain = arrangement(kind, s), lanes = arrangement(kind, s);
-            const auto one = choose_model(s, Arithmetic::Plain), many = choose_model(s, Arithmetic::Lanes);
+            const auto one = choose_model(s, Arithmetic::Scalar), many = choose_model(s, Arithmetic::Simd);
             const auto a = run<double>(*one, plain, 0.1, 1e-4, 1e-4);
             const auto b = run<double>(*many, lanes, 0.3, 1e-4, 1e-4);
             EXPECT_EQ(a.pairs, b.pairs);
@@ -332,7 +332,7 @@ TEST(Pass, AnyWidthOfLanesAndAnySkinGivesTheSameBits)
 /// margin the lists are pruned when they have moved.
 template <class T> std::pair<PassResult, Particles> moved_since_pruned(const Scene& s, double way, std::optional<double> margin)
 {
-    const auto model = choose_model(s, Arithmetic::Lanes);
+    const auto model = choose_model(s, Arithmetic::Simd);
     Cloud c = arrangement(1, s);
     c.sort();
     c.build(model->cluster_width(), 0.4);
@@ -388,12 +388,12 @@ TEST(Pass, MixedPrecisionStaysNearDouble)
     for (const Scene& base : scenes()) {
         Scene s = base;
         Cloud exact = arrangement(1, s);
-        const auto full = choose_model(s, Arithmetic::Lanes);
+        const auto full = choose_model(s, Arithmetic::Simd);
         const Cloud before = exact;
         run<double>(*full, exact, 0.1, 1e-4, 1e-4);
         s.accuracy.precision = scene::Precision::Mixed;
         Cloud rough = arrangement(1, s);
-        const auto mixed = choose_model(s, Arithmetic::Lanes);
+        const auto mixed = choose_model(s, Arithmetic::Simd);
         run<float>(*mixed, rough, 0.1, 1e-4, 1e-4);
         double worst = 0, largest = 0;
         for (Index i = 0; i < exact.particles.size(); ++i) {
@@ -417,7 +417,7 @@ TEST(Pass, MomentumIsKeptToRoundOff)
         Vector change{};
         c.sort();
         Cloud after = c;
-        run<double>(*choose_model(s, Arithmetic::Lanes), after, 0.1, 0, 1e-4);
+        run<double>(*choose_model(s, Arithmetic::Simd), after, 0.1, 0, 1e-4);
         for (Index i = 0; i < c.particles.size(); ++i) {
             const double m = c.soils[0].density * s.particle_volume();
             // m dv of the stored density: rho_i V_i = m

@@ -5,7 +5,7 @@
 // $KUZURE_RESULTS/<case>_<name>.csv; without the variable nothing is written. A criterion that the solver does not meet
 // stays in the record as failed; the test then asserts the bound that it does meet, so that a change for the worse shows.
 #include "io/scene_file.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/simulation.hpp"
 #include "tests/mpi/world.hpp"
 #include <chrono>
 #include <cstdio>
