@@ -112,7 +112,7 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
     static constexpr std::pair<std::string_view, std::string_view> others[] = {
         {"rho", "density"},        {"E", "young"},    {"nu", "poisson"},    {"c", "cohesion"},   {"phi", "friction_angle"},
         {"psi", "dilation_angle"}, {"dx", "spacing"}, {"dp", "spacing"},    {"dt", "step"},      {"g", "gravity"},
-        {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}};
+        {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}, {"cuboid", "box"}};
     for (const auto& [other, ours] : others)
         if (written == other && std::find(known.begin(), known.end(), ours) != known.end()) return std::string(ours);
     // A very long word is near to nothing, and its distances would take long.
