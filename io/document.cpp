@@ -166,7 +166,10 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     case Kind::ChoiceOrTable:
         return node.is_table() ? std::nullopt : wrong_choice(key, node);
     case Kind::Table:
+    case Kind::Settings:
         return unless(node.is_table());
+    case Kind::TextOrTrue:
+        return unless(node.is_string() || node.value_or(false));
     case Kind::Named:
         return unless(node.is_table() && !node.as_table()->empty());
     case Kind::Texts:
@@ -398,8 +401,10 @@ const toml::node& fallback(const Key& key)
 void Document::check_table(toml::table& table, const std::string& path)
 {
     const std::string pattern = keys_.pattern_of(path);
+    const Key* self = path.empty() ? nullptr : keys_.find(path);
     for (const auto& [key, node] : table)
-        if (!keys_.find(join(path, key.str())) || key.str().find('.') != std::string_view::npos)
+        if (self && self->kind == Kind::Settings) break;
+        else if (!keys_.find(join(path, key.str())) || key.str().find('.') != std::string_view::npos)
             complain_unknown(join(path, key.str()), key.str(), pattern);
 
     for (const Key* key : keys_.inside(pattern)) {

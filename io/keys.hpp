@@ -23,7 +23,9 @@ enum class Kind {
     Table,         // a table of keys
     Tables,        // [[...]], any number of tables
     Named,         // [....name], any number of tables with names
-    Texts          // an array of strings
+    Texts,         // an array of strings
+    TextOrTrue,    // a string, or true
+    Settings       // a table, or one of several, in which any key may stand beside those that have rows
 };
 
 /// Interval of allowed numbers; open ends are excluded.

@@ -44,6 +44,10 @@ std::string shown_value(const Key& key)
         return "table";
     case Kind::Texts:
         return "array of strings";
+    case Kind::TextOrTrue:
+        return "string or true";
+    case Kind::Settings:
+        return "table of settings";
     case Kind::Tables:
     case Kind::Named:
         break; // these are headings
@@ -133,6 +137,13 @@ Json value_schema(const Key& key)
                 {"minProperties", 1}};
     case Kind::Texts:
         return array_of({{"type", "string"}}, 0);
+    case Kind::TextOrTrue:
+        return {{"anyOf", Json::array({Json{{"type", "string"}}, Json{{"const", true}}})}};
+    case Kind::Settings: {
+        auto j = table_schema(key.path);
+        j["additionalProperties"] = true;
+        return j;
+    }
     }
     return {};
 }
