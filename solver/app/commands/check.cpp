@@ -41,12 +41,16 @@ std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
 
 void add_reference(CLI::App& app, Action& chosen)
 {
-    app.add_subcommand("reference", "every key of a scene, as Markdown (docs/scene.md)")->callback([&chosen] {
-        chosen = [](const Comm& comm) {
-            if (comm.rank() == 0) fmt::print("{}", io::scene_reference());
-            return Exit::Ok;
-        };
-    });
+    const auto add = [&](const char* name, const char* about, std::string (*text)()) {
+        app.add_subcommand(name, about)->callback([&chosen, text] {
+            chosen = [text](const Comm& comm) {
+                if (comm.rank() == 0) fmt::print("{}", text());
+                return Exit::Ok;
+            };
+        });
+    };
+    add("reference", "every key of a scene, as Markdown (docs/scene.md)", io::scene_reference);
+    add("schema", "every key of a scene, as a JSON Schema by which editors complete and check scenes", io::scene_schema);
 }
 
 void add_check(CLI::App& app, Action& chosen)
