@@ -6,12 +6,12 @@ namespace kuzure::io {
 namespace {
 
 constexpr const char* names = "time,step,dt,kinetic,potential,elastic,plastic,viscous,wall,damping,residual,max_speed,height,"
-                              "front_min_x,front_max_x,front_min_y,front_max_y";
+                              "front_min_x,front_max_x,front_min_y,front_max_y,stabilising,moved_wall";
 
 std::string units(int dimensions)
 {
     const char* energy = dimensions == 3 ? "J" : "J/m";
-    return fmt::format("# s,1,s,{0},{0},{0},{0},{0},{0},{0},1,m/s,m,m,m,m,m", energy);
+    return fmt::format("# s,1,s,{0},{0},{0},{0},{0},{0},{0},1,m/s,m,m,m,m,m,{0},{0}", energy);
 }
 
 /// Shortest digits that read back to the same number. What is not there is written here: fmt compares it, which traps.
@@ -21,7 +21,7 @@ std::string text(const HistoryRow& r)
 {
     std::string line = fmt::format("{},{}", cell(r.time), r.step);
     for (double x : {r.dt, r.kinetic, r.potential, r.elastic, r.plastic, r.viscous, r.wall, r.damping, r.residual, r.max_speed, r.height,
-                     r.front_min_x, r.front_max_x, r.front_min_y, r.front_max_y})
+                     r.front_min_x, r.front_max_x, r.front_min_y, r.front_max_y, r.stabilising, r.moved_wall})
         line += ',' + cell(x);
     return line;
 }

@@ -13,6 +13,7 @@ struct HistoryRow {
     double residual;                                                     // 1
     double max_speed;                                                    // m/s
     double height, front_min_x, front_max_x, front_min_y, front_max_y;   // m
+    double stabilising, moved_wall; // J; work of artificial stress and stress diffusion, of walls that move
 };
 
 class History : public Rows {

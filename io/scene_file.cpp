@@ -13,6 +13,10 @@ namespace {
 void apply_preset(toml::table& root)
 {
     const auto name = root["accuracy"]["preset"].value<std::string>();
+    // Bui's one pass is stable to a third of the staggered step only.
+    if (auto* accuracy = root["accuracy"].as_table();
+        accuracy && !accuracy->contains("cfl") && (*accuracy)["scheme"].value<std::string>() == "leap-frog" && name != "seed")
+        accuracy->insert("cfl", name == "fast" ? 0.3 : 0.2);
     for (const Preset& preset : presets()) {
         if (!name || preset.name != *name) continue;
         for (const auto& [path, value] : preset.settings) {

@@ -20,14 +20,11 @@ enum class Phase {
     Ghosts,
     Lists,
     // Per step
-    TimeStep,
+    Move,
     HaloBegin,
     Interior,
     HaloWait,
     Rim,
-    Walls,
-    Effects,
-    Update,
     Reduce,
     Guard,
     // Output
@@ -43,9 +40,8 @@ inline constexpr int n_phases = int(Phase::Count);
 
 /// Names as they stand in timers.json and timers.txt.
 inline constexpr std::array<std::string_view, n_phases> phase_names{
-    "setup",      "partition",      "migrate",       "sort",      "ghosts",     "lists",   "time step",
-    "begin halo", "interior pairs", "wait for halo", "rim pairs", "walls",      "effects", "update",
-    "reduce",     "guard",          "snapshot",      "history",   "checkpoint", "picture", "other"};
+    "setup",         "partition", "migrate", "sort",  "ghosts",   "lists",   "move",       "begin halo", "interior pairs",
+    "wait for halo", "rim pairs", "reduce",  "guard", "snapshot", "history", "checkpoint", "picture",    "other"};
 static_assert(std::ranges::none_of(phase_names, &std::string_view::empty), "every phase needs a name");
 
 constexpr std::string_view name(Phase phase) { return phase_names[int(phase)]; }

@@ -6,24 +6,28 @@
 namespace kuzure {
 
 namespace {
-constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping"};
+constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising"};
 static_assert(dissipated_names.size() == std::tuple_size_v<decltype(DissipatedUnits::members)>);
 } // namespace
 
 std::string clock_text(const Simulation& sim)
 {
     Clock c = sim.clock();
-    nlohmann::ordered_json extremes, dissipated;
+    nlohmann::ordered_json extremes, dissipated, later;
     std::size_t k = 0;
     for_each_member(c.extremes, c.extremes, [&](double& x, double&) { extremes[Extremes::names[k++]] = x; });
     k = 0;
     for_each_member(c.dissipated, c.dissipated, [&](std::int64_t& u, std::int64_t&) { dissipated[dissipated_names[k++]] = u; });
+    k = 0;
+    for_each_member(c.later, c.later, [&](std::int64_t& u, std::int64_t&) { later[dissipated_names[k++]] = u; });
     return nlohmann::ordered_json{{"time", c.time},
                                   {"step", c.step},
                                   {"dt", c.dt},
                                   {"extremes", extremes},
                                   {"pairs", c.pairs},
                                   {"dissipated", dissipated},
+                                  {"later", later},
+                                  {"next", c.next},
                                   {"energy_at_start", c.energy_at_start},
                                   {"energy_unit", c.energy_unit},
                                   {"step_scale", c.step_scale},
@@ -46,6 +50,9 @@ Clock clock_from_text(const std::string& header, const io::Path& file)
         k = 0;
         for_each_member(c.dissipated, c.dissipated,
                         [&](std::int64_t& u, std::int64_t&) { j.at("dissipated").at(dissipated_names[k++]).get_to(u); });
+        k = 0;
+        for_each_member(c.later, c.later, [&](std::int64_t& u, std::int64_t&) { j.at("later").at(dissipated_names[k++]).get_to(u); });
+        j.at("next").get_to(c.next);
         j.at("energy_at_start").get_to(c.energy_at_start), j.at("energy_unit").get_to(c.energy_unit);
         j.at("step_scale").get_to(c.step_scale), j.at("base_time").get_to(c.base_time);
         j.at("base_step").get_to(c.base_step), j.at("inspected").get_to(c.inspected);

@@ -70,8 +70,8 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     for (int k = 0; k < 2; ++k) sim.step();
     const auto& t = sim.timers();
     const double rebuild = t.seconds(Phase::Migrate) + t.seconds(Phase::Sort) + t.seconds(Phase::Ghosts) + t.seconds(Phase::Lists);
-    m.rebuild_particle = comm.max(rebuild) / std::max<double>(1, double(sim.filling().soil_count()) *
-                                                                     double(std::max<std::int64_t>(1, sim.rebuilds())));
+    m.rebuild_particle =
+        comm.max(rebuild) / std::max<double>(1, double(sim.filling().soil_count()) * double(std::max<std::int64_t>(1, sim.rebuilds())));
     // Rounds of about 30 ms each: as many steps as that takes.
     const double first = comm.max(t.seconds(Phase::Interior) + t.seconds(Phase::Rim)) / 2;
     const int steps = std::clamp(int(0.03 / std::max(first, 1e-6)), 2, 50);

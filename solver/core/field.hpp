@@ -34,7 +34,17 @@ inline constexpr struct Stress : Field<"stress", "Pa", Shape::Symmetric> {
 } stress;
 inline constexpr struct PlasticStrain : Field<"plastic_strain", "1", Shape::Scalar> {
 } plastic_strain;
-// State half a step earlier: what the leap-frog advances.
+// Of the staggered scheme, at t: what the next half kick needs; the stress rate of diffusion, for the next strain.
+inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vector> {
+} acceleration;
+inline constexpr struct StressRate : Field<"stress_rate", "Pa/s", Shape::Symmetric> {
+} stress_rate;
+// Only where there are Coulomb walls: elastic slip, and the force density with which a wall holds the particle (0: no contact).
+inline constexpr struct WallSlip : Field<"wall_slip", "m", Shape::Vector> {
+} wall_slip;
+inline constexpr struct WallPressure : Field<"wall_pressure", "N/m^3", Shape::Scalar> {
+} wall_pressure;
+// State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
 } half_velocity;
 inline constexpr struct HalfDensity : Field<"half_step_density", "kg/m^3", Shape::Scalar> {
@@ -58,8 +68,8 @@ inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::in
 /// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
 enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
-using AllFields =
-    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::HalfVelocity,
-               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::Acceleration,
+                             field::StressRate, field::WallSlip, field::WallPressure, field::HalfVelocity, field::HalfDensity,
+                             field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

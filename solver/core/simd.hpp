@@ -294,8 +294,8 @@ KUZURE_T T largest(Simd<T, W> a)
 }
 
 // ---- roots and reciprocals -----------------------------------------------------------------------------------------
-/// {sqrt(a), 1/sqrt(a), 1/b}. Where the machine divides slowly (AVX-512): 14-bit estimates and one third-order Newton step each,
-/// below 1e-12; elsewhere an IEEE square root and one division, which serves both reciprocals where both are wanted.
+/// {sqrt(a), 1/sqrt(a), 1/b}: an IEEE square root and one division, which serves both reciprocals where both are wanted, so that
+/// every instruction set gives the same bits.
 template <class V> struct Roots {
     V root, inverse_root, inverse;
 };
@@ -303,24 +303,17 @@ template <class V> struct Roots {
 template <bool InverseRoot, class V> KUZURE_INLINE Roots<V> roots(V a, V b)
 {
     using T = number<V>;
-#if defined(__AVX512F__)
-    if constexpr (sizeof(T) == 8 && width<V> == 8) {
-        const V y = V(_mm512_rsqrt14_pd(a.v)), e = fnma(a * y, y, V(T(1)));
-        const V z = V(_mm512_rcp14_pd(b.v)), f = fnma(b, z, V(T(1)));
-        const V inverse_root = fma(y * e, fma(e, V(T(0.375)), V(T(0.5))), y);
-        return {a * inverse_root, inverse_root, fma(z, fma(f, f, f), z)};
-    }
-    if constexpr (sizeof(T) == 4 && width<V> == 16) {
-        const V y = V(_mm512_rsqrt14_ps(a.v)), e = fnma(a * y, y, V(T(1)));
-        const V z = V(_mm512_rcp14_ps(b.v)), f = fnma(b, z, V(T(1)));
-        const V inverse_root = fma(y * e, V(T(0.5)), y);
-        return {a * inverse_root, inverse_root, fma(z, f, z)};
-    }
-#endif
     const V s = sqrt(a);
     if constexpr (!InverseRoot) return {s, s, V(T(1)) / b};
     const V r = V(T(1)) / (s * b);
     return {s, r * b, r * s};
+}
+/// The same without the last.
+template <bool InverseRoot, class V> KUZURE_INLINE Roots<V> root(V a)
+{
+    const V s = sqrt(a);
+    if constexpr (!InverseRoot) return {s, s, s};
+    return {s, V(number<V>(1)) / s, s};
 }
 
 /// Tell the processor of this thread to take denormal numbers as zero: they cost 60 to 70 times a normal operation.

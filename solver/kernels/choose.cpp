@@ -16,7 +16,8 @@ template <int I> std::unique_ptr<PairModel> first_that_covers(const scene::Inter
 {
     if constexpr (I == KUZURE_VARIANTS) throw Broken("no compiled pair model covers this scene: see solver/kernels/variants.hpp");
     else {
-        if (std::tuple_element_t<I, Variants>::covers(s)) return make_variant<I>(s, a);
+        if (std::tuple_element_t<I, Variants>::covers(s) && (s.scheme == scene::Scheme::Staggered || has_leap_frog(I)))
+            return make_variant<I>(s, a);
         return first_that_covers<I + 1>(s, a);
     }
 }

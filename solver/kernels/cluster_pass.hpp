@@ -10,7 +10,6 @@
 #include "solver/kernels/pair_model.hpp"
 #include "solver/pairs/cluster.hpp"
 #include "solver/physics/drucker_prager.hpp"
-#include "solver/walls/mirrored.hpp"
 #include <bit>
 #include <omp.h>
 
@@ -96,18 +95,6 @@ template <class M, class V> class ClusterPass : public PairModel {
 public:
     int cluster_width() const override { return W; }
     scene::Precision precision() const override { return single<V> ? scene::Precision::Mixed : scene::Precision::Double; }
-    void place_walls(std::span<const scene::Wall> walls, std::span<const WallPoints> points) override
-    {
-        walls_.resize(points.size());
-        for (std::size_t w = 0; w < points.size(); ++w) {
-            auto& to = walls_[w];
-            const std::size_t n = points[w].x.size();
-            to.wall = &walls[points[w].wall];
-            to.x.resize(n), to.y.resize(n), to.z.resize(n);
-            for (std::size_t k = 0; k < n; ++k)
-                to.x[k] = place_(points[w].x[k]), to.y[k] = place_(points[w].y[k]), to.z[k] = place_(points[w].z[k]);
-        }
-    }
 
 protected:
     using T = number<V>;
@@ -125,13 +112,6 @@ protected:
     {
         return M::name() + (single<V> ? ", mixed" : ", double") + (W > 1 ? " x " + std::to_string(W) : ", plain");
     }
-    std::size_t wall_bytes() const
-    {
-        std::size_t b = 0;
-        for (const auto& w : walls_) b += w.x.size() * 3 * sizeof(w.x[0]);
-        return b;
-    }
-
     /// body(cluster, tally) over all clusters, by all threads.
     template <class Body> PassResult over(std::span<const Index> clusters, Body body) const
     {
@@ -212,7 +192,6 @@ protected:
     double scale_;
     FixedPoint<T> place_;
     PoreWater water_;
-    std::vector<WallRecords<T>> walls_;
 };
 
 } // namespace kuzure

@@ -2,6 +2,8 @@
 // Bui's leap-frog (2008): one pass a step. Half-step values advance by a whole kick; values at the step's end are predicted from
 // them with half a step of the rates. With velocity and stress from one pass this is Adams-Bashforth 2.
 #include "solver/kernels/cluster_pass.hpp"
+#include "solver/scene/scene.hpp"
+#include "solver/walls/mirrored.hpp"
 
 namespace kuzure {
 
@@ -13,8 +15,7 @@ template <int W> struct WallShare {
 
 template <class M, class V> class LeapFrog final : public ClusterPass<M, V> {
     using Base = ClusterPass<M, V>;
-    using Base::W, Base::unit_, Base::dimensions_, Base::h_, Base::volume_, Base::model_, Base::scale_, Base::place_, Base::water_,
-        Base::walls_;
+    using Base::W, Base::unit_, Base::dimensions_, Base::h_, Base::volume_, Base::model_, Base::scale_, Base::place_, Base::water_;
     using typename Base::T, typename Base::U;
 
     /// sum V_j rho_i rho_j Pi approach grad W: the power that viscosity takes.
@@ -44,7 +45,7 @@ public:
     std::string name() const override { return Base::lanes_name(); }
     std::span<const Stage> stages() const override { return {&stage_, 1}; }
     std::size_t record_bytes() const override { return 2 * stage_.row_bytes; }
-    void require_fields(Particles& p) const override { p.require(field::half_velocity, field::half_density, field::half_stress); }
+    void require_fields(Particles& p, bool) const override { p.require(field::half_velocity, field::half_density, field::half_stress); }
     void start(Particles& p) const override
     {
         for (Index i = 0; i < p.size(); ++i) {
@@ -56,7 +57,7 @@ public:
     std::size_t bytes() const override
     {
         return (now_.capacity() + next_.capacity()) * sizeof(Record<T>) +
-               (tension_.capacity() + next_tension_.capacity()) * sizeof(Tension<T>) + Base::wall_bytes();
+               (tension_.capacity() + next_tension_.capacity()) * sizeof(Tension<T>) + wall_bytes();
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
@@ -83,6 +84,18 @@ public:
             if (M::tensile) tension_[k] = next_tension_[k] = {};
         }
     }
+    void place_walls(const Scene& scene, std::span<const WallPoints> points) override
+    {
+        walls_.resize(points.size());
+        for (std::size_t w = 0; w < points.size(); ++w) {
+            auto& to = walls_[w];
+            const std::size_t n = points[w].x.size();
+            to.wall = &scene.walls[points[w].wall];
+            to.x.resize(n), to.y.resize(n), to.z.resize(n);
+            for (std::size_t k = 0; k < n; ++k)
+                to.x[k] = place_(points[w].x[k]), to.y[k] = place_(points[w].y[k]), to.z[k] = place_(points[w].z[k]);
+        }
+    }
     void pack(int, Index owned, Vector shift, std::byte* to) const override
     {
         Record<T> r = now_[owned];
@@ -104,6 +117,13 @@ public:
     }
 
 private:
+    std::size_t wall_bytes() const
+    {
+        std::size_t b = 0;
+        for (const auto& w : walls_) b += w.x.size() * 3 * sizeof(w.x[0]);
+        return b;
+    }
+
     KUZURE_INLINE void one_cluster(const StepInput& in, Index cluster, Tally<U>& tally)
     {
         Cluster<V> i = Base::cluster_at(in, cluster, tally);
@@ -205,7 +225,7 @@ private:
         std::int64_t pairs = 0;
         while (!runs.empty()) {
             const Index number = runs[0];
-            const WallRecords<T>& wall = walls_[number];
+            const MirroredWall<T>& wall = walls_[number];
             const auto list = runs.subspan(2, runs[1]);
             runs = runs.subspan(2 + runs[1]);
             WallContact contact[W];
@@ -466,14 +486,16 @@ private:
         const U inverse_rho = one / now.rho;
         const U volume = U(volume_) * soil.rho0 * inverse_rho;
         // viscous power of i's half of its pairs: V_i/2 sum_j V_j rho_i rho_j Pi approach |grad W|/r
-        // and what other terms against noise take: artificial stress -V v.f, stress diffusion -V sigma : C^-1 : D
-        const U viscous = quantized(volume * (half * (-factor) * sums.viscous_power - r.diffused - r.stressed) * kick, magic);
+        // artificial stress takes -V v.f, stress diffusion -V sigma : C^-1 : D
+        const U viscous = quantized(volume * (half * (-factor) * sums.viscous_power) * kick, magic);
         const U worked = quantized(volume * a.h.work, magic);
         const U damped = quantized(volume * now.rho * mu_d * dot(now.v, now.v) * kick, magic);
         const U walled = quantized(volume * load<U>(share.power + lanes.first) * kick, magic);
         tally.energy.plastic += select(mine, worked, zero);
         tally.energy.viscous += select(mine, viscous, zero);
         tally.energy.damping += select(mine, damped, zero);
+        if constexpr (M::tensile || M::diffusive)
+            tally.energy.stabilising -= select(mine, quantized(volume * (r.diffused + r.stressed) * kick, magic), zero);
         tally.energy.wall += select(mine, walled, zero);
         const Vec3<U> moved = a.x - p[field::sorted_position].template load<U>(lanes.at);
         const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
@@ -493,6 +515,7 @@ private:
     }
 
     Stage stage_;
+    std::vector<MirroredWall<T>> walls_;
     Index n_ = 0;
     Array<Record<T>> now_, next_;
     Array<Tension<T>> tension_, next_tension_;

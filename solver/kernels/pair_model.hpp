@@ -30,6 +30,7 @@ struct StepInput {
     double margin = 0; // m, how far beyond the support the pruned lists reach
     double dt;         // length of this step, s
     double kick;       // half of the step before and half of this one, s
+    double next;       // length of the step to come, s
     StepForces forces;
     bool evolving = false; // a soil's cone changes with strain or its rate
     double energy_unit;    // J
@@ -62,15 +63,19 @@ public:
     /// Bytes of the records of one particle.
     virtual std::size_t record_bytes() const = 0;
     /// Columns that the scheme advances; others are the run's.
-    virtual void require_fields(Particles&) const = 0;
+    virtual void require_fields(Particles&, bool coulomb_walls) const = 0;
     /// Those columns at the start of a run, from the state: velocity, density, stress.
     virtual void start(Particles&) const = 0;
 
     /// Records of owned particles, from their columns, and room for so many ghosts of these soils.
     virtual void make_records(const Particles&, std::span<const Material>, std::span<const std::int32_t> ghost_soil) = 0;
-    /// The wall points near this rank's soil; the walls themselves must outlive the model's use.
-    virtual void place_walls(std::span<const scene::Wall>, std::span<const WallPoints>) = 0;
+    /// The wall points near this rank's soil; the scene must outlive the model's use.
+    virtual void place_walls(const Scene&, std::span<const WallPoints>) = 0;
 
+    /// True where a step first moves the particles by the acceleration they have (move()), which must be there at the start: stages run
+    /// once with a step of no length. The length of the step to come is then decided one step ahead.
+    virtual bool moves_first() const { return false; }
+    virtual void move(const StepInput&) {}
     /// One stage over some clusters. Ghosts must have arrived where the clusters' lists hold any.
     virtual PassResult run(int stage, const StepInput&, std::span<const Index> clusters) = 0;
     /// After the last cluster of a stage.

@@ -15,6 +15,9 @@ using Variants = std::tuple<Model<CubicSpline, NoViscosity>, Model<CubicSpline, 
                             Model<WendlandC2, LinearViscosity, NoArtificialStress, NoStressDiffusion, GradientCorrection>,
                             Everything<CubicSpline>, Everything<WendlandC2>, Everything<WendlandC4>>;
 
+/// Bui's leap-frog is compiled for the paper's dry collapse and for everything.
+inline constexpr bool has_leap_frog(int variant) { return variant == 1 || variant >= 8; }
+
 inline constexpr int KUZURE_VARIANTS = 11; // read by CMakeLists.txt and Makefile.knl
 static_assert(std::tuple_size_v<Variants> == KUZURE_VARIANTS);
 

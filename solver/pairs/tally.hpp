@@ -9,11 +9,12 @@
 namespace kuzure {
 
 /// Energy that left the mechanical ledger, J (J/m in 2-D), one number or one lane of numbers each. Every addend is a multiple
-/// of one unit fixed for the run, so the sums are exact and equal in any order. Viscous: artificial viscosity and the other
-/// terms against noise, artificial stress and stress diffusion, together.
+/// of one unit fixed for the run, so the sums are exact and equal in any order. Stabilising: artificial stress and stress
+/// diffusion, which may give as well as take.
 template <class V> struct Energies {
-    V plastic{}, viscous{}, wall{}, damping{};
-    static constexpr std::tuple members{&Energies::plastic, &Energies::viscous, &Energies::wall, &Energies::damping};
+    V plastic{}, viscous{}, wall{}, damping{}, stabilising{};
+    static constexpr std::tuple members{&Energies::plastic, &Energies::viscous, &Energies::wall, &Energies::damping,
+                                        &Energies::stabilising};
 };
 using EnergySums = Energies<double>;
 
@@ -48,6 +49,7 @@ template <class A, class B, class Visit> KUZURE_INLINE void for_each_member(A& a
 /// Energies, maxima and counts of the clusters one thread has done, a lane each; or of a whole pass.
 template <class V> struct Tally {
     Energies<V> energy;
+    Energies<V> later; // of the half of the step to come that is known already
     Maxima<V> maxima;
     V poison{};              // a sum of zeros, or not a number
     std::int64_t pairs = 0;  // directed, inside the support
@@ -57,6 +59,7 @@ template <class V> struct Tally {
     void add(const Tally& o)
     {
         for_each_member(energy, o.energy, [](V& a, const V& b) { a += b; });
+        for_each_member(later, o.later, [](V& a, const V& b) { a += b; });
         for_each_member(maxima, o.maxima, [](V& a, const V& b) { a = max(b, a); });
         poison += o.poison, pairs += o.pairs, asleep += o.asleep;
     }
@@ -65,6 +68,7 @@ template <class V> struct Tally {
     {
         Tally<double> t;
         for_each_member(t.energy, energy, [](double& a, const V& b) { a = sum(b); });
+        for_each_member(t.later, later, [](double& a, const V& b) { a = sum(b); });
         for_each_member(t.maxima, maxima, [](double& a, const V& b) { a = largest(b); });
         t.poison = sum(poison), t.pairs = pairs, t.asleep = asleep;
         if (!(t.poison == 0)) t.maxima.not_finite = 1, t.poison = 0;

@@ -14,6 +14,8 @@ struct Clock {
     Extremes extremes{};        // of the step before, over all particles
     std::int64_t pairs = 0;     // summed over steps and ranks (kept by rank 0)
     DissipatedUnits dissipated; // over ranks (kept by rank 0)
+    DissipatedUnits later;      // of the half step to come (likewise)
+    double next = 0;            // s, length of the step to come, where it is decided one step ahead
     double energy_at_start = 0; // J
     double energy_unit = 0;     // J
     // Steps are the scene's times step_scale since base_step, which began at base_time: 1, 0, 0 unless a retry halved them.
@@ -22,7 +24,7 @@ struct Clock {
     std::int64_t inspected = 0; // step of the guard's last inspection
 };
 
-/// Length of the step that starts at clock.time, s, 0 when the end time is reached:
+/// Length of a step that starts at clock.time, s, 0 when the end time is reached:
 ///     dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|) ),  or the scene's fixed step; the last one ends on time.
 double step_length(const Scene&, const Clock&);
 /// Where a step of this length ends, s.

@@ -5,20 +5,22 @@
 namespace kuzure {
 
 StateEnergy state_energy(const Team& team, const Particles& p, std::span<const Material> soils, double volume, Vector gravity,
-                         const PoreWater& water, double unit)
+                         const PoreWater& water, double unit, double dt)
 {
     const auto x = p[field::position], o = p[field::origin], v = p[field::velocity];
     const auto s = p[field::stress];
     const auto rho = p[field::density];
     const auto soil = p[field::soil];
     const double magic = magic_of(unit);
+    const bool staggered = p.has(field::acceleration);
     double kinetic = 0, potential = 0, elastic = 0;
     const Index n = p.size();
 #pragma omp parallel for schedule(static) reduction(+ : kinetic, potential, elastic)
     for (Index i = 0; i < n; ++i) {
         const Material& m = soils[soil[i]];
         const double mass = m.density * volume;
-        kinetic += quantized(0.5 * mass * dot(v[i], v[i]), magic);
+        const Vector half_kick = staggered ? (0.5 * dt) * p[field::acceleration][i] : Vector{};
+        kinetic += quantized(0.5 * mass * (dot(v[i], v[i]) - dot(half_kick, half_kick)), magic);
         potential += quantized(
             -mass * dot(gravity, x[i] - o[i]) + (water.present() ? volume * (water.at(x[i]).value - water.at(o[i]).value) : 0.0), magic);
         // sigma : C^-1 : sigma/2 = J2/(2 G) + I1^2/(18 K)

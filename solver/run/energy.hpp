@@ -19,9 +19,13 @@ struct StateEnergy {
 
 /// What left the mechanical ledger since the start, in whole units. Exact; addition in any order.
 struct DissipatedUnits {
-    std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0;
+    std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0, stabilising = 0;
     static constexpr std::tuple members{&DissipatedUnits::plastic, &DissipatedUnits::viscous, &DissipatedUnits::wall,
-                                        &DissipatedUnits::damping};
+                                        &DissipatedUnits::damping, &DissipatedUnits::stabilising};
+    void add(const DissipatedUnits& o)
+    {
+        for_each_member(*this, o, [](std::int64_t& units, std::int64_t more) { units += more; });
+    }
     void add(const EnergySums& e, double unit)
     {
         for_each_member(*this, e, [unit](std::int64_t& units, double joules) { units += std::int64_t(joules / unit); });
@@ -38,9 +42,10 @@ struct Ledger {
     double sum() const;
 };
 
-/// Collective. Energies of the present state; `unit` (J) must be a power of two far below them.
+/// Collective. Energies of the present state; `unit` (J) must be a power of two far below them. Where the particles have an
+/// acceleration, kinetic energy is m v^{n-1/2}.v^{n+1/2}/2 = m (v^2 - (dt/2 a)^2)/2, which elastic waves keep (dt: the step before, s).
 StateEnergy state_energy(const Team&, const Particles&, std::span<const Material>, double volume, Vector gravity, const PoreWater&,
-                         double unit);
+                         double unit, double dt);
 
 /// Collective. 64-bit hash over all particles by id, of every column that the next step needs; -0 counts as +0.
 std::string state_hash(const Team&, const Particles&);

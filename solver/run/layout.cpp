@@ -40,8 +40,9 @@ void Layout::sort_at_present_positions(Particles& p) const
 }
 
 void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::span<const Material> soils, PairModel& model,
-                     Timers& timers)
+                     Timers& timers, double way)
 {
+    reach_ = std::max(list_reach(scene_), scene_.support() + way * (1 + 1e-6));
     rethrow_on_all_ranks(comm, [&] {
         timers.timed(Phase::Sort, [&] {
             const auto x = p[field::sorted_position];
@@ -126,7 +127,7 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
                 });
             }
     for (auto& w : walls_) w.sort(columns_);
-    model.place_walls(scene_.walls, walls_);
+    model.place_walls(scene_, walls_);
 }
 
 void Layout::prepare_lists(StepInput& in, double way, double speed)

@@ -21,8 +21,9 @@ public:
     void wrap_into_period(Particles&) const;
     /// The present positions are where particles are sorted from now on.
     void sort_at_present_positions(Particles&) const;
-    /// Sorts by sorted_position; then ghosts, walls, lists, and the model's records. Collective. Throws NumbersFailed.
-    void rebuild(const Comm&, const Domain&, Particles&, std::span<const Material>, PairModel&, Timers&);
+    /// Sorts by sorted_position; then ghosts, walls, lists, and the model's records. Pairs may have been nearer by `way` m in the step
+    /// under way. Collective. Throws NumbersFailed.
+    void rebuild(const Comm&, const Domain&, Particles&, std::span<const Material>, PairModel&, Timers&, double way);
 
     /// Decides whether a step's first stage prunes the lists anew and with which margin: particles may move by `way` m before the
     /// last stage, and by some more each step. Call it once a step.

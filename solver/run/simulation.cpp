@@ -45,10 +45,11 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
             for (const auto& m : soils_) mass = std::max(mass, m.density * scene_.particle_volume() * double(filling_.soil_count()));
             clock_.energy_unit = std::max(clock_.energy_unit, energy_unit(mass * clock_.extremes.speed2));
         }
-        clock_.energy_at_start = ledger().sum();
         const Vector g = scene_.effects.gravity.value_or(Vector{});
         clock_.extremes.acceleration2 = dot(g, g);
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+        if (model_->moves_first()) evaluate_start();
+        clock_.energy_at_start = ledger().sum();
     });
 }
 
@@ -59,7 +60,11 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
         particles_ = std::move(particles);
         prepare();
         work_.steps = clock.step;
-        if (comm_.rank() != 0) clock_.pairs = 0, clock_.dissipated = {};
+        if (comm_.rank() != 0) clock_.pairs = 0, clock_.dissipated = clock_.later = {};
+        if (model_->moves_first() && clock_.next == 0) { // it was at its end, which is further now
+            clock_.next = step_length(scene_, clock_);
+            if (clock_.next > 0 && !scene_.time.step) clock_.extremes.displacement2 = std::numeric_limits<double>::infinity();
+        }
         balance_.cut_state(scene_, particles_, layout_, clock_.step > 0, [&] { rebuild(false); });
     });
 }
@@ -72,7 +77,8 @@ void Simulation::prepare()
     for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
     particles_.require(field::position, field::velocity, field::density, field::stress, field::plastic_strain, field::sorted_position,
                        field::origin, field::id, field::soil);
-    model_->require_fields(particles_);
+    model_->require_fields(particles_,
+                           std::ranges::any_of(scene_.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; }));
     if (scene_.accuracy.sleep_below > 0) {
         particles_.require(field::activity);
         sleep_interval_ = scene::sleep_interval(scene_);
@@ -88,19 +94,48 @@ Requests Simulation::step(Requests mine)
 {
     const double dt = next_dt();
     ensure(dt > 0, "a finished run was asked for another step");
+    if (!last_good_) remember(); // the start of the run, or of its restart
+    StepInput in = step_input(dt, following_dt(dt));
+    timers_.timed(Phase::Move, [&] { model_->move(in); });
     const bool rebuilt = layout_.outgrown(clock_.extremes.displacement2);
-    if (rebuilt) rebuild(true);
-    remember_if_good(rebuilt);
-    StepInput in = step_input(dt);
-    layout_.prepare_lists(in, 0, std::sqrt(clock_.extremes.speed2));
-    PassResult result;
-    for (int stage = 0; stage < int(model_->stages().size()); ++stage) result.add(run_stage(stage, in));
-    mine = end_step(dt, result, mine);
+    const double way = model_->moves_first() ? dt * std::sqrt(clock_.extremes.drift2) : 0;
+    if (rebuilt) rebuild(true, way);
+    layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.speed2));
+    const PassResult result = run_stages(in);
+    mine = end_step(in, result, mine);
     watch_.judge_step(particles_, clock_);
+    remember_if_good(rebuilt);
     return mine;
 }
 
-void Simulation::rebuild(bool sort_anew)
+double Simulation::following_dt(double dt) const
+{
+    if (!model_->moves_first()) return 0;
+    Clock then = clock_;
+    then.time = time_after(scene_, clock_, dt);
+    then.step += 1;
+    return step_length(scene_, then);
+}
+
+PassResult Simulation::run_stages(const StepInput& in)
+{
+    PassResult result;
+    for (int stage = 0; stage < int(model_->stages().size()); ++stage) result.add(run_stage(stage, in));
+    return result;
+}
+
+void Simulation::evaluate_start()
+{
+    clock_.next = step_length(scene_, clock_);
+    rebuild(true);
+    StepInput in = step_input(0, clock_.next);
+    layout_.prepare_lists(in, 0, std::sqrt(clock_.extremes.speed2));
+    const PassResult result = run_stages(in);
+    clock_.later.add(result.later, clock_.energy_unit);
+    reduce(result, {});
+}
+
+void Simulation::rebuild(bool sort_anew, double way)
 {
     if (sort_anew)
         timers_.timed(Phase::Migrate, [&] {
@@ -108,7 +143,7 @@ void Simulation::rebuild(bool sort_anew)
             balance_.migrate(scene_, particles_, layout_, rebuilds_, timers_);
             layout_.sort_at_present_positions(particles_);
         });
-    layout_.rebuild(comm_, domain_, particles_, soils_, *model_, timers_);
+    layout_.rebuild(comm_, domain_, particles_, soils_, *model_, timers_, way);
     if (sort_anew) clock_.extremes.displacement2 = 0;
     ++rebuilds_;
 }
@@ -144,16 +179,26 @@ PassResult Simulation::run_stage(int stage, const StepInput& in)
     return result;
 }
 
-Requests Simulation::end_step(double dt, PassResult result, Requests mine)
+Requests Simulation::end_step(const StepInput& in, const PassResult& result, Requests mine)
 {
     work_.pairs += result.pairs, work_.asleep += result.asleep;
     work_.halo_bytes += halo_bytes(), work_.messages += halo_messages();
     if (work_.first_step.soil == 0) work_.first_step = {particles_.size(), result.pairs, ghosts(), halo_bytes(), halo_messages()};
     work_.particle_steps += particles_.size();
+    const double following = following_dt(in.dt);
     clock_.dissipated.add(result.energy, clock_.energy_unit);
-    clock_.time = time_after(scene_, clock_, dt);
+    clock_.dissipated.add(std::exchange(clock_.later, {}));
+    clock_.later.add(result.later, clock_.energy_unit);
+    clock_.time = time_after(scene_, clock_, in.dt);
     clock_.step += 1, work_.steps += 1;
-    clock_.dt = dt;
+    clock_.dt = in.dt, clock_.next = following;
+    mine = reduce(result, mine);
+    if (!model_->moves_first()) layout_.moved(in.dt * std::sqrt(clock_.extremes.drift2));
+    return mine;
+}
+
+Requests Simulation::reduce(const PassResult& result, Requests mine)
+{
     timers_.timed(Phase::Reduce, [&] {
         constexpr std::size_t n = std::tuple_size_v<decltype(Extremes::members)>;
         std::array<double, n + 2> all;
@@ -169,17 +214,17 @@ Requests Simulation::end_step(double dt, PassResult result, Requests mine)
     // Sleeping particles are not in the maxima: the step is never longer than the soil at rest allows.
     if (scene_.accuracy.sleep_below > 0)
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
-    layout_.moved(dt * std::sqrt(clock_.extremes.drift2));
     return mine;
 }
 
-StepInput Simulation::step_input(double dt)
+StepInput Simulation::step_input(double dt, double next)
 {
     StepInput in{.particles = &particles_,
                  .lists = &layout_.lists(),
                  .soils = soils_,
                  .dt = dt,
                  .kick = 0.5 * (clock_.dt + dt),
+                 .next = next > 0 ? next : dt, // a run's last forces work as if it went on
                  .forces = {scene_.effects.gravity.value_or(Vector{}), damping()},
                  .evolving = evolving_,
                  .energy_unit = clock_.energy_unit,
@@ -227,16 +272,17 @@ void Simulation::count_work(Phase phase, const Stage& stage, std::int64_t pairs,
 void Simulation::remember_if_good(bool rebuilt)
 {
     if (!options_.guard || !rebuilt) return;
-    const auto remember = [&] {
-        if (scene_.time.retry) last_good_ = SavedState{particles_, clock_, work_, domain_.known()};
-    };
-    if (!last_good_) remember(); // the start of the run, or of its restart
     if (clock_.step - clock_.inspected < 64) return;
     timers_.timed(Phase::Guard, [&] {
         clock_.inspected = clock_.step;
         watch_.inspect(particles_, layout_, clock_, ledger());
         remember();
     });
+}
+
+void Simulation::remember()
+{
+    if (options_.guard && scene_.time.retry) last_good_ = SavedState{particles_, clock_, work_, domain_.known()};
 }
 
 bool Simulation::roll_back()
@@ -252,6 +298,7 @@ bool Simulation::roll_back()
     domain_.know_again(last_good_->known);
     domain_.migrate(particles_);
     rebuild(false);
+    if (model_->moves_first()) clock_.next = step_length(scene_, clock_);
     return true;
 }
 
@@ -261,7 +308,7 @@ Ledger Simulation::ledger() const
 {
     Ledger l;
     l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), scene_.effects.gravity.value_or(Vector{}), water_,
-                           clock_.energy_unit * 65536);
+                           clock_.energy_unit * 65536, clock_.dt);
     auto units = over_ranks(comm_, clock_.dissipated);
     for_each_member(l.dissipated, units, [&](double& joules, std::int64_t& u) { joules = double(u) * clock_.energy_unit; });
     return l;
@@ -282,7 +329,7 @@ Clock Simulation::clock() const
 {
     Clock c = clock_;
     c.pairs = pairs();
-    c.dissipated = over_ranks(comm_, c.dissipated);
+    c.dissipated = over_ranks(comm_, c.dissipated), c.later = over_ranks(comm_, c.later);
     return c;
 }
 

@@ -38,7 +38,7 @@ public:
     /// One step. Collective. Returns the requests of all ranks combined. Throws NumbersFailed on every rank together.
     Requests step(Requests mine = {});
     /// Length of the next step, s; 0 when the end time is reached.
-    double next_dt() const { return step_length(scene_, clock_); }
+    double next_dt() const { return model_->moves_first() ? clock_.next : step_length(scene_, clock_); }
     bool finished() const { return next_dt() == 0; }
 
     double time() const { return clock_.time; }
@@ -82,16 +82,23 @@ public:
 private:
     Simulation(const Comm&, const Scene&, RunOptions, const Clock&);
     void prepare();
-    void rebuild(bool sort_anew);
-    StepInput step_input(double dt);
+    void rebuild(bool sort_anew, double way = 0);
+    StepInput step_input(double dt, double next);
+    /// The forces of the start, where steps need them first. Collective.
+    void evaluate_start();
+    PassResult run_stages(const StepInput&);
+    Requests reduce(const PassResult&, Requests mine);
     /// 1/s, while the scene asks for it.
     double damping() const;
     SleepStage sleep_stage() const;
     /// A stage over all clusters, those without ghosts while the halo travels.
     PassResult run_stage(int stage, const StepInput&);
     void count_work(Phase, const Stage&, std::int64_t pairs, std::size_t clusters);
-    Requests end_step(double dt, PassResult, Requests mine);
+    Requests end_step(const StepInput&, const PassResult&, Requests mine);
+    /// Length of the step after one of this length, where it is decided ahead, s.
+    double following_dt(double dt) const;
     void remember_if_good(bool rebuilt);
+    void remember();
 
     const Comm& comm_;
     Scene scene_;

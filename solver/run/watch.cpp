@@ -95,11 +95,11 @@ std::pair<std::string, std::string> Watch::diagnosis(const Clock& clock) const
     const double h = scene_.smoothing_length(), courant = clock.dt / scene::crossing_time(scene_);
     const double a = std::sqrt(clock.extremes.acceleration2), free = a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity();
     const bool tension = std::any_of(soils_.begin(), soils_.end(), [](const Material& m) { return m.k > 0; });
-    if (courant > scene::recommended_courant)
-        return {fmt::format("the time step is too long for the P-wave: dt c_p/h = {:.3g}, recommended up to {}", courant,
-                            scene::recommended_courant),
+    if (courant > scene::recommended_courant(scene_))
+        return {fmt::format("the time step is too long for the P-wave: dt c_p/h = {:.3g}, recommended up to {:.3g}", courant,
+                            scene::recommended_courant(scene_)),
                 fmt::format("a time.step of {:.3g} s or less, or none (accuracy.cfl then sets it)", scene::recommended_step(scene_))};
-    if (clock.dt > scene::recommended_courant * free)
+    if (clock.dt > scene::recommended_courant(scene_) * free)
         return {fmt::format("the time step is too long for the acceleration: dt = {:.3g} s, sqrt(h/|a|) = {:.3g} s", clock.dt, free),
                 "a smaller time.step, or none (accuracy.cfl then sets it)"};
     if (!scene_.effects.viscosity)

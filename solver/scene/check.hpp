@@ -7,11 +7,12 @@
 
 namespace kuzure::scene {
 
-/// Above this dt c_p/h nearly every run fails (docs/stability.md, the map of stable steps); it is refused unless the user
-/// insists.
-inline constexpr double unstable_courant = 0.6;
-/// Up to this dt c_p/h columns and collapses with viscosity kept their energy with every kernel; above it a warning.
-inline constexpr double recommended_courant = 0.3;
+/// dt c_p/h above which a scheme is unstable by theory (staggered; of kernel, h and viscosity) or nearly every run fails
+/// (leap-frog); docs/stability.md has the map of stable steps.
+double courant_limit(const Scene&);
+/// What is refused unless the user insists, and up to where columns and collapses kept their energy; above it a warning.
+double unstable_courant(const Scene&);
+double recommended_courant(const Scene&);
 
 /// min over soils of h/c_p (s): a Courant number of one.
 double crossing_time(const Scene&);

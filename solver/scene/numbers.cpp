@@ -42,8 +42,8 @@ std::vector<Judgement> judge(const Scene& s, const Filling& f)
     add("layers", height / dx, "H/spacing, layers of particles over the height; 20 and more for profiles, 50 for stresses", height / dx < 8,
         fmt::format("{:.0f} layers of particles are too few for profiles and stresses; 20 and more are for that", height / dx));
     const double dt = s.time.step.value_or(s.accuracy.cfl * crossing_time(s));
-    add("courant", dt / crossing_time(s), fmt::format("dt c_p/h, step against the P-wave; recommended up to {}", recommended_courant),
-        false, {});
+    add("courant", dt / crossing_time(s),
+        fmt::format("dt c_p/h, step against the P-wave; recommended up to {:.3g}", recommended_courant(s)), false, {});
     const double slender = height / (0.5 * width);
     if (g > 0)
         add("slenderness", slender, "H over half the width", slender > 2.7 && cohesion == 0 && !rate,

@@ -136,6 +136,8 @@ struct EffectNote {
 enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
 enum class Precision { Double, Mixed };
 enum class Correction { None, Gradient };
+/// How a step is made of passes over pairs: Bui's one pass, or the two-pass staggered leap-frog.
+enum class Scheme { Staggered, LeapFrog };
 
 /// What a compiled pair model is chosen by and set up with.
 struct Interactions {
@@ -145,6 +147,7 @@ struct Interactions {
     Kernel kernel;
     Precision precision;
     Correction correction;
+    Scheme scheme = Scheme::Staggered;
 };
 
 } // namespace kuzure::scene

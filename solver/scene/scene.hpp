@@ -10,10 +10,11 @@ enum class Preset { Seed, Fast, Standard, Accurate };
 struct Accuracy {
     Preset preset = Preset::Standard;
     Kernel kernel = Kernel::WendlandC2;
-    double cfl = 0.2;
+    double cfl = 1.0;
+    Scheme scheme = Scheme::Staggered;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;
-    double skin = 0.1;      // list skin in support radii (2 h): cost only, results change in their last bits
+    double skin = 0.2;      // list skin in support radii (2 h): cost only, results change in their last bits
     double sleep_below = 0; // m/s; soil that is slower, among soil that is slower, sleeps; 0: never
     bool operator==(const Accuracy&) const = default;
 };
@@ -78,7 +79,8 @@ struct Scene {
     }
     scene::Interactions interactions() const
     {
-        return {dimensions, space.spacing, smoothing_length(), effects, accuracy.kernel, accuracy.precision, accuracy.correction};
+        return {dimensions,      space.spacing,      smoothing_length(),  effects,
+                accuracy.kernel, accuracy.precision, accuracy.correction, accuracy.scheme};
     }
     bool operator==(const Scene&) const = default;
 };

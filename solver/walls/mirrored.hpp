@@ -8,7 +8,7 @@
 namespace kuzure {
 
 /// Points of one wall as the pair loop reads them.
-template <class T> struct WallRecords {
+template <class T> struct MirroredWall {
     const scene::Wall* wall;
     Array<Coordinate<T>> x, y, z;
 };

@@ -19,7 +19,7 @@ TEST(Phases, EveryNameIsItsOwn)
     EXPECT_EQ(std::set(phase_names.begin(), phase_names.end()).size(), std::size_t(n_phases));
     EXPECT_EQ(name(Phase::Migrate), "migrate");
     EXPECT_EQ(name(Phase::Lists), "lists");
-    EXPECT_EQ(name(Phase::TimeStep), "time step");
+    EXPECT_EQ(name(Phase::Move), "move");
     EXPECT_EQ(name(Phase::Rim), "rim pairs");
     EXPECT_EQ(name(Phase::Reduce), "reduce");
     EXPECT_EQ(name(Phase::Picture), "picture");

@@ -6,6 +6,7 @@
 #include "io/snapshot.hpp"
 #include "io/summary.hpp"
 #include "perf/report.hpp"
+#include "solver/app/clock_text.hpp"
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
 #include "solver/app/estimate.hpp"
@@ -13,11 +14,10 @@
 #include "solver/app/measure.hpp"
 #include "solver/app/report/movie.hpp"
 #include "solver/app/report/report.hpp"
-#include "solver/run/simulation.hpp"
-#include "solver/app/clock_text.hpp"
 #include "solver/app/status.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/core/simd.hpp"
+#include "solver/run/simulation.hpp"
 #include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -264,7 +264,7 @@ private:
         sim_->timers().did(Phase::History, 45 * n, 20 * 8 * n);
         history_->append({sim_->time(), sim_->steps(), sim_->dt(), l.state.kinetic, l.state.potential, l.state.elastic,
                           l.dissipated.plastic, l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_,
-                          sim_->max_speed(), heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y});
+                          sim_->max_speed(), heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y, l.dissipated.stabilising, 0.0});
     }
 
     void write_picture(int number)
@@ -333,9 +333,10 @@ private:
         s.seconds_per_step = steps_here > 0 ? stepping / double(steps_here) : 0;
         const std::int64_t particle_steps = comm_.sum(work.particle_steps);
         s.particle_steps_per_second = stepping > 0 ? double(particle_steps) / stepping : 0;
-        s.energy = {{"kinetic", l.state.kinetic},      {"potential", l.state.potential},  {"elastic", l.state.elastic},
-                    {"plastic", l.dissipated.plastic}, {"viscous", l.dissipated.viscous}, {"wall", l.dissipated.wall},
-                    {"damping", l.dissipated.damping}, {"residual", sim_->residual(l)}};
+        s.energy = {{"kinetic", l.state.kinetic},      {"potential", l.state.potential},          {"elastic", l.state.elastic},
+                    {"plastic", l.dissipated.plastic}, {"viscous", l.dissipated.viscous},         {"wall", l.dissipated.wall},
+                    {"damping", l.dissipated.damping}, {"stabilising", l.dissipated.stabilising}, {"moved_wall", 0.0},
+                    {"residual", sim_->residual(l)}};
         s.effects = scene_.notes;
         s.state_hash = state_hash(comm_, sim_->particles());
         s.message = message;

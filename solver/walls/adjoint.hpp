@@ -1,0 +1,82 @@
+#pragma once
+// Walls in the pair loop. Three choices: the surface (surface.hpp: tangent planes at wall points), the law (how a wall point mirrors
+// what it sees of a particle), the contact (what of force and motion crosses the surface).
+//
+// Force and strain are adjoint: with the mirror factor f_ij and the projection P_j of the contact
+//
+//     rho_i dv_i/dt += sum_j V_j f_ij P_j (sigma_i . grad W_ij),     L_i -= sum_j V_j f_ij (P_j v_i) (x) grad W_ij
+//
+// the force's power v . f equals -sigma : L, so that a fixed wall neither gives nor takes energy. Rough: P = 1; smooth and Coulomb:
+// P = n (x) n. Coulomb's friction is a traction of its own (friction.hpp).
+#include "solver/core/memory.hpp"
+#include "solver/pairs/cluster.hpp"
+#include "solver/scene/parts.hpp"
+#include "solver/walls/surface.hpp"
+
+namespace kuzure {
+
+/// One exposed face behind which a wall point lies, as lanes see it; lengths in the unit of the pair sums.
+template <class T> struct FaceRecord {
+    T nx, ny, nz, depth;
+    T stick;   // 1: all of the motion is mirrored (rough), 0: its normal part
+    T coulomb; // 1 where Coulomb's law holds
+    T tangent; // tan(friction angle)
+    T last;    // 1 for the last face of its point
+};
+
+/// Points of one wall as the pair loop reads them, and the faces of each.
+template <class T> struct WallRecords {
+    Array<Coordinate<T>> x, y, z;
+    std::vector<Index> first; // of each point in `faces`
+    std::vector<FaceRecord<T>> faces;
+};
+
+/// What the lanes of a cluster see of one wall point.
+template <class V> struct Mirror {
+    Vec3<V> normal;
+    V factor; // (v_i - v_j)/v_i of what is mirrored
+    V stick, coulomb, tangent;
+};
+
+/// Law of Morris et al. (1997) and Bui et al. (2008), eq. 45, point by point: the velocity vanishes on the tangent plane,
+///     f = 1 + d_B/d_A,  d_B the point's depth, d_A = (x_i - x_j).n - d_B,  at most `cap`.
+struct TangentPlane {
+    static constexpr double cap = 2;
+    template <class V> KUZURE_INLINE V factor(V along, V depth) const
+    {
+        using T = number<V>;
+        const V front = max(along - depth, V(T(1e-9)));
+        return min(max(along / front, V(T(1))), V(T(cap)));
+    }
+};
+
+/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
+template <class Law, class V, class T> KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face)
+{
+    const auto of = [&](const FaceRecord<T>& f) {
+        const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
+        return Mirror<V>{n, law.factor(dot(r, n), V(f.depth)), V(f.stick), V(f.coulomb), V(f.tangent)};
+    };
+    Mirror<V> m = of(*face);
+    if (face->last != T(0)) return m;
+    V settled = select(less(V(face->depth), dot(r, m.normal)), V(T(1)), V(T(0)));
+    do {
+        ++face;
+        const Mirror<V> next = of(*face);
+        const V take = select(less(V(face->depth), dot(r, next.normal)), V(T(1)) - settled, V(T(0)));
+        const auto use = less(V(T(0.5)), take);
+        m.normal = {select(use, next.normal.x, m.normal.x), select(use, next.normal.y, m.normal.y), select(use, next.normal.z, m.normal.z)};
+        m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
+        m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
+        settled = settled + take;
+    } while (face->last == T(0));
+    return m;
+}
+/// P a: all of a at a rough wall, else its normal part.
+template <class V> KUZURE_INLINE Vec3<V> project(const Mirror<V>& m, Vec3<V> a)
+{
+    const Vec3<V> normal = dot(a, m.normal) * m.normal;
+    return fma(m.stick, a - normal, normal);
+}
+
+} // namespace kuzure

@@ -1,0 +1,121 @@
+#include "solver/walls/surface.hpp"
+#include "solver/scene/shape.hpp"
+#include <limits>
+
+namespace kuzure {
+
+namespace {
+
+/// A point of a face and the face's own normal there.
+struct Candidate {
+    Vector point, normal;
+};
+
+double clamped(double x, double low, double high) { return std::min(std::max(x, low), high); }
+
+/// Calls visit(candidate) with the closest point of every face of a shape.
+template <class Visit> void for_each_face(const scene::Box& b, Vector x, int dimensions, Visit visit)
+{
+    const Vector in{clamped(x.x, b.low.x, b.high.x), clamped(x.y, b.low.y, b.high.y), clamped(x.z, b.low.z, b.high.z)};
+    visit(Candidate{{in.x, in.y, b.high.z}, {0, 0, 1}}), visit(Candidate{{in.x, in.y, b.low.z}, {0, 0, -1}});
+    visit(Candidate{{b.high.x, in.y, in.z}, {1, 0, 0}}), visit(Candidate{{b.low.x, in.y, in.z}, {-1, 0, 0}});
+    if (dimensions == 3) visit(Candidate{{in.x, b.high.y, in.z}, {0, 1, 0}}), visit(Candidate{{in.x, b.low.y, in.z}, {0, -1, 0}});
+}
+template <class Visit> void for_each_face(const scene::Sphere& s, Vector x, int dimensions, Visit visit)
+{
+    const auto c = scene::contact(s, x, dimensions);
+    visit(Candidate{x - c.distance * c.normal, c.normal});
+}
+template <class Visit> void for_each_face(const scene::Cylinder& c, Vector x, int, Visit visit)
+{
+    const double dx = x.x - c.base.x, dy = x.y - c.base.y, r = std::hypot(dx, dy);
+    const Vector out = r > 0 ? Vector{dx / r, dy / r, 0} : Vector{1, 0, 0};
+    const double z = clamped(x.z, c.base.z, c.base.z + c.height), in = std::min(r, c.radius);
+    visit(Candidate{{c.base.x + c.radius * out.x, c.base.y + c.radius * out.y, z}, out});
+    visit(Candidate{{c.base.x + in * out.x, c.base.y + in * out.y, c.base.z + c.height}, {0, 0, 1}});
+    visit(Candidate{{c.base.x + in * out.x, c.base.y + in * out.y, c.base.z}, {0, 0, -1}});
+}
+template <class Visit> void for_each_face(const scene::Polygon& p, Vector x, int dimensions, Visit visit)
+{
+    const std::size_t n = p.points.size();
+    const double turn = scene::area(p) >= 0 ? 1 : -1, y = dimensions == 3 ? clamped(x.y, p.y[0], p.y[1]) : x.y;
+    for (std::size_t k = 0; k < n; ++k) {
+        const auto &a = p.points[k], &b = p.points[k + 1 < n ? k + 1 : 0];
+        const double ex = b[0] - a[0], ez = b[1] - a[1], l = std::hypot(ex, ez);
+        const double t = clamped(((x.x - a[0]) * ex + (x.z - a[1]) * ez) / (l * l), 0, 1);
+        visit(Candidate{{a[0] + t * ex, y, a[1] + t * ez}, {turn * ez / l, 0, -turn * ex / l}});
+    }
+    if (dimensions == 3 && scene::contains(p, {x.x, 0.5 * (p.y[0] + p.y[1]), x.z}))
+        visit(Candidate{{x.x, p.y[1], x.z}, {0, 1, 0}}), visit(Candidate{{x.x, p.y[0], x.z}, {0, -1, 0}});
+}
+
+} // namespace
+
+WallSurface::WallSurface(const Scene& scene) : scene_(scene), dimensions_(scene.dimensions), tolerance_(1e-6 * scene.space.spacing)
+{
+    const auto& s = scene.space;
+    const Vector period = s.low ? *s.high - *s.low : Vector{};
+    const int px = s.periodic[0], py = s.periodic[1], pz = s.periodic[2];
+    for (int w = 0; w < int(scene.walls.size()); ++w) {
+        auto b = scene::bounds(scene.walls[w].shape);
+        if (dimensions_ == 2) b.low.y = -std::numeric_limits<double>::infinity(), b.high.y = std::numeric_limits<double>::infinity();
+        for (int i = -px; i <= px; ++i)
+            for (int j = -py; j <= py; ++j)
+                for (int k = -pz; k <= pz; ++k) {
+                    const Vector shift{i * period.x, j * period.y, k * period.z};
+                    parts_.push_back({w, shift, {b.low + shift, b.high + shift}});
+                }
+    }
+}
+
+bool WallSurface::covered(Vector x) const
+{
+    for (const Part& part : parts_) {
+        const auto &lo = part.bounds.low, &hi = part.bounds.high;
+        if (x.x < lo.x || x.z < lo.z || x.x > hi.x || x.z > hi.z || x.y < lo.y || x.y > hi.y) continue;
+        // What touches covers: flush shapes leave no gap, whatever their last digits.
+        if (scene::signed_distance(scene_.walls[part.wall].shape, x - part.shift, dimensions_) < 0) return true;
+    }
+    return false;
+}
+
+void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) const
+{
+    found.clear();
+    for (const Part& part : parts_) {
+        const auto &lo = part.bounds.low, &hi = part.bounds.high;
+        if (point.x < lo.x - reach || point.z < lo.z - reach || point.x > hi.x + reach || point.z > hi.z + reach ||
+            point.y < lo.y - reach || point.y > hi.y + reach)
+            continue;
+        const Vector x = point - part.shift;
+        std::visit(
+            [&](const auto& shape) {
+                for_each_face(shape, x, dimensions_, [&](const Candidate& c) {
+                    Vector way = c.point - x;
+                    if (dimensions_ == 2) way.y = 0;
+                    const double depth = length(way);
+                    if (depth > reach) return;
+                    // Beside the foot of the perpendicular an edge is closest: the surface faces the way to it.
+                    const double straight = dot(way, c.normal);
+                    const Vector normal = depth - std::fabs(straight) <= tolerance_ ? c.normal : (1 / depth) * way;
+                    if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
+                    if (covered(c.point + part.shift + tolerance_ * normal)) return;
+                    for (const Face& f : found)
+                        if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) return;
+                    found.push_back({normal, depth, part.wall});
+                });
+            },
+            scene_.walls[part.wall].shape);
+    }
+    std::stable_sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return a.depth < b.depth - tolerance_; });
+}
+
+double WallSurface::depth(Vector point, double reach) const
+{
+    if (!covered(point)) return 0;
+    std::vector<Face> found;
+    faces(point, reach, found);
+    return found.empty() ? reach : found.front().depth;
+}
+
+} // namespace kuzure
