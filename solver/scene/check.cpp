@@ -12,7 +12,7 @@ namespace {
 double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 const char* name_of(Cone cone)
 {
-    static constexpr const char* names[] = {"compression", "extension", "plane strain", "plane strain, no dilation"};
+    static constexpr const char* names[] = {"compression", "extension", "plane strain", "plane strain, no dilation", "shear"};
     return names[int(cone)];
 }
 
@@ -123,14 +123,15 @@ void check_soils(const Scene& scene, Rules& rules)
         if (m.alpha == 0 && !soil.tension_cutoff)
             rules.warning(key, "without friction the cone has no apex, so the soil bears any mean tension; give a "
                                "tension_cutoff if it should not");
-        if (soil.cone == Cone::Compression && scene.dimensions == 2 && m.alpha > 0) {
-            const double s = 3 * m.alpha;
-            rules.warning(key + ".cone", s < 1 ? text("in plane strain the compression cone acts like a friction angle of {:.1f} deg "
-                                                      "instead of {:.4g}; the plane strain cones do not",
-                                                      degrees(std::asin(s)), degrees(soil.friction_angle))
-                                               : "in plane strain the compression cone has no limit at this friction angle; the plane "
-                                                 "strain cones have");
-        }
+        if (soil.cone == Cone::Compression && scene.dimensions == 2 && m.alpha > 0)
+            rules.warning(key + ".cone",
+                          text("in plane strain the compression cone acts like a friction angle of {:.1f} deg on a rough bed "
+                               "(atan 3 alpha) and {} instead of {:.4g}; the plane strain and shear cones are nearer",
+                               degrees(m.angle_on_a_rough_bed()),
+                               m.circle_is_limited()
+                                   ? text("{:.1f} deg by its stress circle (asin 3 alpha)", degrees(m.angle_of_the_stress_circle()))
+                                   : std::string("no limit by its stress circle (3 alpha >= 1)"),
+                               degrees(soil.friction_angle)));
         if (std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) { return b.soil == int(i); }))
             rules.warning(key, "no body is made of this soil");
     }
