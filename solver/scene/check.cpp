@@ -188,7 +188,8 @@ void check_space(const Scene& scene, Rules& rules)
         const double period = at(*space.high, axis) - at(*space.low, axis), n = period / space.spacing;
         const double least = 2 * scene.support() * (1 + scene.accuracy.skin);
         if (!(period > 0)) continue;
-        if (std::abs(n - std::round(n)) > 1e-6)
+        const double largest = std::max(std::abs(at(*space.low, axis)), std::abs(at(*space.high, axis)));
+        if (std::abs(n - std::round(n)) > std::max(1e-6, rounding_of(largest) / space.spacing))
             rules.error("space.periodic", text("expected a period of whole spacings along {}, found {:.9g} spacings of {} m; "
                                                "change space.high",
                                                names[axis], n, space.spacing));
@@ -392,7 +393,8 @@ void check_inside(const Scene& scene, Rules& rules)
         const Box box = bounds(shape);
         for (int axis = 0; axis < 3; ++axis) {
             if ((axis == 1 && scene.dimensions == 2) || (only_periodic && !space.periodic[std::size_t(axis)])) continue;
-            const double low = at(*space.low, axis), high = at(*space.high, axis), slack = 1e-6 * space.spacing;
+            const double low = at(*space.low, axis), high = at(*space.high, axis),
+                         slack = std::max(1e-6 * space.spacing, rounding_of(std::max(std::abs(low), std::abs(high))));
             if (at(box.low, axis) < low - slack || at(box.high, axis) > high + slack)
                 return rules.error(key,
                                    text("expected it inside space.low .. space.high = {:.6g} .. {:.6g} m "
@@ -557,6 +559,12 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     if (filling) {
         for (auto& judgement : judge(scene, *filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+            if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess)
+                rules.warning(text("body.{}.{}", b, name_of(scene.bodies[b].shape)),
+                              text("its particles hold {:.2g} % {} mass than its volume would: lattice points and faces do not fit; a "
+                                   "smaller space.spacing, or faces moved by part of one, come nearer",
+                                   100 * std::abs(excess), excess > 0 ? "more" : "less"));
         const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",
@@ -566,6 +574,12 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     issues = rules.issues;
     if (!filling) return {};
     return Ready{std::move(scene), std::move(rules.issues), std::move(*filling)};
+}
+
+double excess_of_mass(const Scene& scene, const Filling& filling, int body)
+{
+    const double held = double(filling.body_count(body)) * scene.particle_volume();
+    return held / volume(scene.bodies[std::size_t(body)].shape, scene.dimensions) - 1;
 }
 
 double column_bytes(const Filling& filling)

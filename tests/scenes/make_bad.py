@@ -140,7 +140,7 @@ CASES = {
     "box_upside_down": ([(BOX, "box = { low = [0.0, 0.0, 1.0], high = [1.0, 1.0, 0.0] }")], r'body\.0\.box: expected low < high along z, found 1 and 0'),
     "box_fraction": ([(BOX, BOX.replace("high = [1.0,", "high = [1.05,"))], r':16: body\.0\.box: expected a whole number of spacings \(0\.1 m\) a side, found 10\.5 along x; let high\.x be 1 or 1\.1'),
     "box_huge": ([("spacing = 0.1", "spacing = 1e-6"), ("1.0, 1.0, 1.0", "1e3, 1e3, 1e3")], r'body\.0\.box: expected a shape that a computer can hold'),
-    "sphere_empty": ([(BOX, "sphere = { center = [0.0, 0.0, 2.0], radius = 0.01 }")], r'body\.0\.sphere: expected particles strictly inside, found none'),
+    "sphere_empty": ([(BOX, "sphere = { center = [0.0, 0.0, 2.0], radius = 0.01 }")], r'body\.0\.sphere: expected particles inside, found none'),
     "bodies_overlap": ([("[[wall]]", "[[body]]\nsoil = \"sand\"\nbox = { low = [0.9, 0.0, 0.0], high = [2.0, 1.0, 1.0] }\n[[wall]]")], r':17: body\.1: expected shapes that at most touch, found an overlap of body\.1 with body\.0 by 0\.1 m.*body\.0 is at .*:14'),
     "wall_overlaps": ([("[-1.0, -1.0, -0.4], high = [2.0, 2.0, 0.0]", "[-1.0, -1.0, -0.4], high = [2.0, 2.0, 0.1]")], r'wall\.0: expected shapes that at most touch, found an overlap of wall\.0 with body\.0'),
     "sphere_in_box": ([("[[wall]]", "[[body]]\nsoil = \"sand\"\nsphere = { center = [0.5, 0.5, 1.2], radius = 0.5 }\n[[wall]]")], r'body\.1: expected shapes that at most touch, found an overlap of body\.1 with body\.0'),

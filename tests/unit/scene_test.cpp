@@ -1,6 +1,7 @@
 // Rules beyond single keys, the choice of effects, and the numbers derived from a soil.
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -238,10 +239,27 @@ TEST(Scene, TwoDimensionsIgnoreY)
     s.bodies[0].shape = Box{{0, 9, 0}, {1, -3.33, 1}};
     s.space.low = Vector{-1, 5, -1}, s.space.high = Vector{2, -5, 2};
     EXPECT_TRUE(check(s).empty());
-    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {0, 1}}, {}};
+    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {}};
     EXPECT_TRUE(check(s).empty());
     s.bodies[0].velocity.y = 1;
     EXPECT_NE(error(s, "body.0.velocity"), "nothing");
+}
+
+TEST(Scene, MassIsHeldAgainstTheShapesVolume)
+{
+    auto s = column();
+    EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 0, 1e-12);
+    // Ten rows of 9 to 0 points: the slanted face lies on lattice points and looks to greater coordinates.
+    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {0, 1}}, {0, 1}};
+    EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 450.0 / 500 - 1, 1e-12);
+    EXPECT_THAT(warning(s, "body.0.polygon"), HasSubstr("hold 10 % less mass than its volume would"));
+    s.bodies[0].shape = Polygon{{{1, 1}, {0, 1}, {1, 0}}, {0, 1}};
+    EXPECT_THAT(warning(s, "body.0.polygon"), HasSubstr("hold 10 % more mass"));
+    s.bodies[0].shape = Sphere{{0, 0, 5}, 1};
+    EXPECT_EQ(warning(s, "body.0.sphere"), "nothing");
+    EXPECT_NEAR(volume(s.bodies[0].shape, 3), 4.18879, 1e-5);
+    EXPECT_NEAR(volume(s.bodies[0].shape, 2), 3.14159, 1e-5);
+    EXPECT_NEAR(volume(Cylinder{{0, 0, 0}, 2, 0.5}, 3), 6.28318, 1e-5);
 }
 
 TEST(Scene, WallsMayLeaveTheSpaceButNotThePeriod)
