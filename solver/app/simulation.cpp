@@ -176,7 +176,7 @@ void Simulation::fill()
         p[field::density].set(i, m.density), p[field::half_density].set(i, m.density);
         p[field::id].set(i, s.id), p[field::soil].set(i, std::int32_t(body.soil));
         if (body.stress == scene::InitialStress::AtRest) {
-            const Stress sigma = at_rest(s.x, body.soil);
+            const Stress sigma = at_rest(s.x, s.body, body.soil);
             p[field::stress].set(i, sigma), p[field::half_stress].set(i, sigma);
         }
     }

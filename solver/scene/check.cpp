@@ -1,5 +1,6 @@
 #include "solver/scene/check.hpp"
 #include "solver/core/field.hpp"
+#include "solver/scene/at_rest.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/shape.hpp"
@@ -565,6 +566,15 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
                               text("its particles hold {:.2g} % {} mass than its volume would: lattice points and faces do not fit; a "
                                    "smaller space.spacing, or faces moved by part of one, come nearer",
                                    100 * std::abs(excess), excess > 0 ? "more" : "less"));
+        if (const auto why = no_closed_form(scene, *filling); !why.empty())
+            for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+                if (scene.bodies[b].stress == InitialStress::AtRest) {
+                    rules.warning(text("body.{}.stress", b),
+                                  text("the stress \"at rest\" is K0 under the column above, which is no equilibrium here: {}; it will "
+                                       "settle at the start, under effects.damping most quietly",
+                                       why));
+                    break;
+                }
         const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",
