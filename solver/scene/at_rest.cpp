@@ -17,6 +17,21 @@ struct Part {
     double foot, top, share;
 };
 
+/// Width (m) of an air gap of less than a spacing between a particle's body and a wall in one direction, or 0.
+double gap_to_a_wall(const Scene& scene, Vector x, int body, Vector direction)
+{
+    const double dx = scene.space.spacing, tolerance = 1e-9 * dx, step = 0.02 * dx;
+    const Shape& own = scene.bodies[std::size_t(body)].shape;
+    double end = 0; // of its body
+    for (double t = 0; t <= end + dx; t += step) {
+        const Vector at = x + t * direction;
+        if (holds(own, at, scene.dimensions, tolerance)) end = t;
+        for (const Wall& w : scene.walls)
+            if (holds(w.shape, at, scene.dimensions, tolerance)) return t - end > 2.5 * step ? t - end : 0;
+    }
+    return 0;
+}
+
 } // namespace
 
 Columns::Columns(const Scene& scene, const Filling& filling) : scene_(scene), filling_(filling), nothing_(least_share(scene, filling)) {}
@@ -126,6 +141,25 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
                 });
             };
             const double low = s.foot + 0.5 * dx, high = s.top - 0.5 * dx;
+            // Sideways it leans on soil or on a wall; a wall just out of reach it will lean on when it has spread.
+            for (const Vector d : {Vector{1, 0, 0}, Vector{-1, 0, 0}, Vector{0, 1, 0}, Vector{0, -1, 0}}) {
+                if (flat && d.y != 0) continue;
+                const Vector first = x + 0.01 * dx * d, second = x + 3 * dx * d, beside = x + 1.5 * dx * d;
+                const double wide = (0.5 - nothing) * dx, wx = d.x == 0 ? wide : 0, wy = d.y == 0 ? wide : 0;
+                const auto between = [&](Vector a, Vector b, double from, double to) {
+                    return Box{{std::min(a.x, b.x) - wx, std::min(a.y, b.y) - wy, from},
+                               {std::max(a.x, b.x) + wx, std::max(a.y, b.y) + wy, to}};
+                };
+                if (filling.wall_count_in(between(first, second, low, high)) == 0) continue;
+                for (double z = low; why.empty() && z < high + 0.5 * dx; z += dx) {
+                    if (filling.soil_count_in(between(first, beside, z - wide, z + wide)) > 0) continue;
+                    const double gap = gap_to_a_wall(scene, {x.x, x.y, z}, int(b), d);
+                    if (gap > 0)
+                        why = fmt::format(
+                            "at ({:.6g}, {:.6g}, {:.6g}) the soil stands {:.2g} m off the wall beside it, on which it should lean", x.x,
+                            x.y, z, gap);
+                }
+            }
             compare({{x.x + nothing * dx, x.y - nothing * dx, low}, {x.x + 1.25 * dx, x.y + (1 - nothing) * dx, high}});
             if (!flat) compare({{x.x - nothing * dx, x.y + nothing * dx, low}, {x.x + (1 - nothing) * dx, x.y + 1.25 * dx, high}});
         });

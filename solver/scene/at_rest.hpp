@@ -31,8 +31,9 @@ private:
 };
 
 /// Why the stress of columns, K0 times the weight above, is no equilibrium of the soil "at rest": tilted gravity, ground or water table
-/// that is not level. Empty where it is one, or where nothing starts at rest. Soil that a gate holds, free at its sides, passes: only
-/// the heights of soil that touches sideways are compared. Where this says why, a settling run has to find the state.
+/// that is not level, a wall beside it just out of reach. Empty where it is one, or where nothing starts at rest. Soil that a gate
+/// holds, free at its sides, passes: only the heights of soil that touches sideways are compared. Where this says why, a settling run
+/// has to find the state.
 std::string no_closed_form(const Scene&, const Filling&);
 
 } // namespace kuzure::scene

@@ -561,7 +561,7 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
         for (auto& judgement : judge(scene, *filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-            if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess)
+            if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess + 1e-9)
                 rules.warning(text("body.{}.{}", b, name_of(scene.bodies[b].shape)),
                               text("its particles hold {:.2g} % {} mass than its volume would: lattice points and faces do not fit; a "
                                    "smaller space.spacing, or faces moved by part of one, come nearer",

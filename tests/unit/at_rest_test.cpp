@@ -252,6 +252,29 @@ TEST(AtRest, WhereNoClosedFormHoldsItIsSaid)
     EXPECT_EQ(why(s), "");
 }
 
+// As reported, the shifted layer stands half a spacing off the walls at its sides; the one below leans on them.
+TEST(AtRest, AWallBesideItHasToBeReached)
+{
+    const Box lower{{0, 0, 0}, {2, 0, 1}};
+    const std::vector<Shape> sides{Box{{-0.4, 0, 0}, {0, 0, 3}}, Box{{2, 0, 0}, {2.4, 0, 3}}};
+    const auto off = HasSubstr("m off the wall beside it");
+    EXPECT_THAT(why(made(0.1, {lower, Box{{0.05, 0, 1}, {1.95, 0, 2}}}, 2, sides)),
+                AllOf(off, HasSubstr("at (0.1, 0, 1.05) the soil stands 0.05")));
+    EXPECT_THAT(why(made(0.1, {lower}, 2, {Box{{2.03, 0, 0}, {2.43, 0, 3}}})), off);
+    EXPECT_EQ(why(made(0.1, {lower, Box{{0, 0, 1}, {2, 0, 2}}}, 2, sides)), "");
+    EXPECT_EQ(why(made(0.1, {lower}, 2, {Box{{-1, 0, -0.4}, {3, 0, 0}}})), "");   // a gate's
+    EXPECT_EQ(why(made(0.1, {lower}, 2, {Box{{2.15, 0, 0}, {2.55, 0, 1}}})), ""); // further off than a spacing: a gate's too
+    // Leaning on polygons, whose particles and those of the soil may be up to 1.5 spacings apart.
+    for (const double face : {2.0, 2.001, 2.04, 2.05, 2.051, 2.099}) {
+        const auto rectangle = [](double x1, double x2, double z2) { return Polygon{{{x1, 0}, {x2, 0}, {x2, z2}, {x1, z2}}, {}}; };
+        EXPECT_EQ(why(made(0.1, {Box{{face - 1, 0, 0}, {face, 0, 1}}}, 2, {rectangle(face, 3, 2)})), "") << face;
+        EXPECT_EQ(why(made(0.1, {rectangle(1, face, 1)}, 2, {Box{{face, 0, 0}, {face + 0.4, 0, 2}}})), "") << face;
+        EXPECT_THAT(why(made(0.1, {rectangle(1, face, 1)}, 2, {Box{{face + 0.06, 0, 0}, {face + 0.46, 0, 2}}})), off) << face;
+    }
+    EXPECT_THAT(why(made(0.1, {Box{{0, 0, 0}, {1, 1, 1}}}, 3, {Box{{0, 1.04, 0}, {1, 1.44, 2}}})), off);
+    EXPECT_EQ(why(made(0.1, {Box{{0, 0, 0}, {1, 1, 1}}}, 3, {Box{{0, 1, 0}, {1, 1.4, 2}}, Box{{0, 0, -0.4}, {1, 1, 0}}})), "");
+}
+
 TEST(AtRest, CheckWarnsWhereItIsNoEquilibrium)
 {
     const auto warning = [](const Scene& s) {
