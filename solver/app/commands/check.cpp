@@ -73,9 +73,10 @@ std::string bodies_and_soils_text(const Scene& s, const scene::Filling& f)
     std::string text;
     for (int b = 0; b < int(s.bodies.size()); ++b) {
         const double excess = scene::excess_of_mass(s, f, b);
-        text += fmt::format("  body.{:<7}{} particles, {:.4g} {}, {}\n", b, f.body_count(b), mass_of(s, f, b), mass_unit(s),
-                            std::abs(excess) < 5e-7 ? "as its shape's volume"
-                                                    : fmt::format("{:+.3g} % against its shape's volume", 100 * excess));
+        text +=
+            fmt::format("  body.{:<7}{} particles, {:.4g} {}: {} its shape's volume\n", b, f.body_count(b), mass_of(s, f, b), mass_unit(s),
+                        std::abs(excess) < 5e-7 ? "the mass of"
+                                                : fmt::format("{:.2g} % {} than", 100 * std::abs(excess), excess > 0 ? "more" : "less"));
     }
     for (const auto& soil : s.soils) {
         const auto m = Material::from(soil);
