@@ -109,6 +109,69 @@ Columns::Above Columns::above(Vector x, int body) const
     return sum;
 }
 
+namespace {
+
+/// One stack of soil at rest, and what it stands next to.
+struct Bystander {
+    const Scene& scene;
+    const Filling& filling;
+    const Columns& columns;
+    double nothing; // as Columns has it
+    int body;
+    Lattice::Stack stack;
+
+    double dx() const { return scene.space.spacing; }
+    double lowest() const { return stack.foot + 0.5 * dx(); }
+    double highest() const { return stack.top - 0.5 * dx(); }
+
+    /// Why the ground is not level from here to the next columns along an axis, or empty.
+    std::string step_up_or_down(bool along_x) const
+    {
+        // At the heights of this stack; across a period from its first column to its last. Faces of shapes may end half a spacing apart
+        // on two lattices.
+        const double beyond = nothing * dx(), reach = 1.25 * dx(), aside = (1 - nothing) * dx();
+        const Vector from{stack.x + (along_x ? beyond : -beyond), stack.y + (along_x ? -beyond : beyond), lowest()};
+        const Vector to{stack.x + (along_x ? reach : aside), stack.y + (along_x ? aside : reach), highest()};
+        const double surface = columns.above({stack.x, stack.y, lowest()}, body).surface;
+        std::string why;
+        const auto compare = [&](Vector shift) {
+            filling.for_each_soil_stack_in({from + shift, to + shift}, [&](const Lattice::Stack& n, int other) {
+                const double there = columns.above({n.x, n.y, n.foot + 0.5 * dx()}, other).surface;
+                if (why.empty() && std::abs(there - surface) > 0.75 * dx())
+                    why =
+                        fmt::format("the ground is not level: its surface is at z = {:.6g} m above ({:.6g}, {:.6g}) and at {:.6g} m above "
+                                    "({:.6g}, {:.6g})",
+                                    surface, stack.x, stack.y, there, n.x, n.y);
+            });
+        };
+        compare({});
+        const Space& space = scene.space;
+        if (along_x && space.periodic[0] && to.x > space.high->x) compare({space.low->x - space.high->x, 0, 0});
+        if (!along_x && space.periodic[1] && to.y > space.high->y) compare({0, space.low->y - space.high->y, 0});
+        return why;
+    }
+
+    /// Why it does not lean on the wall beside it in one direction, just out of reach, or empty.
+    std::string off_the_wall(Vector d) const
+    {
+        const double wide = (0.5 - nothing) * dx(), wx = d.x == 0 ? wide : 0, wy = d.y == 0 ? wide : 0;
+        const auto beside = [&](double reach, double from, double to) {
+            const Vector a = Vector{stack.x, stack.y, 0} + 0.01 * dx() * d, b = Vector{stack.x, stack.y, 0} + reach * dx() * d;
+            return Box{{std::min(a.x, b.x) - wx, std::min(a.y, b.y) - wy, from}, {std::max(a.x, b.x) + wx, std::max(a.y, b.y) + wy, to}};
+        };
+        if (filling.wall_count_in(beside(3, lowest(), highest())) == 0) return {};
+        for (double z = lowest(); z < highest() + 0.5 * dx(); z += dx()) {
+            if (filling.soil_count_in(beside(1.5, z - wide, z + wide)) > 0) continue;
+            if (const double gap = gap_to_a_wall(scene, {stack.x, stack.y, z}, body, d); gap > 0)
+                return fmt::format("at ({:.6g}, {:.6g}, {:.6g}) the soil stands {:.2g} m off the wall beside it, on which it should lean",
+                                   stack.x, stack.y, z, gap);
+        }
+        return {};
+    }
+};
+
+} // namespace
+
 std::string no_closed_form(const Scene& scene, const Filling& filling)
 {
     const auto rests = [](const Body& b) { return b.stress == InitialStress::AtRest; };
@@ -120,49 +183,19 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
             if (corner[1] != effects.pore_pressure->table.front()[1]) return "the water table is not level";
 
     const Columns columns(scene, filling);
-    const double dx = scene.space.spacing, nothing = least_share(scene, filling), far = std::numeric_limits<double>::infinity();
+    const double far = std::numeric_limits<double>::infinity();
     const bool flat = scene.dimensions == 2;
     std::string why;
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-        if (!rests(scene.bodies[b])) continue;
-        filling.for_each_stack_of(int(b), {{-far, -far, -far}, {far, far, far}}, [&](const Lattice::Stack& s) {
-            if (!why.empty()) return;
-            const Vector x{s.x, s.y, s.foot + 0.5 * dx};
-            const double surface = columns.above(x, int(b)).surface;
-            // The next columns along x and y, at the heights of this one. Faces of shapes may end half a spacing apart on two lattices.
-            const auto compare = [&](const Box& region) {
-                filling.for_each_soil_stack_in(region, [&](const Lattice::Stack& n, int body) {
-                    const double other = columns.above({n.x, n.y, n.foot + 0.5 * dx}, body).surface;
-                    if (why.empty() && std::abs(other - surface) > 0.75 * dx)
-                        why = fmt::format(
-                            "the ground is not level: its surface is at z = {:.6g} m above ({:.6g}, {:.6g}) and at {:.6g} m above "
-                            "({:.6g}, {:.6g})",
-                            surface, x.x, x.y, other, n.x, n.y);
-                });
-            };
-            const double low = s.foot + 0.5 * dx, high = s.top - 0.5 * dx;
-            // Sideways it leans on soil or on a wall; a wall just out of reach it will lean on when it has spread.
-            for (const Vector d : {Vector{1, 0, 0}, Vector{-1, 0, 0}, Vector{0, 1, 0}, Vector{0, -1, 0}}) {
-                if (flat && d.y != 0) continue;
-                const Vector first = x + 0.01 * dx * d, second = x + 3 * dx * d, beside = x + 1.5 * dx * d;
-                const double wide = (0.5 - nothing) * dx, wx = d.x == 0 ? wide : 0, wy = d.y == 0 ? wide : 0;
-                const auto between = [&](Vector a, Vector b, double from, double to) {
-                    return Box{{std::min(a.x, b.x) - wx, std::min(a.y, b.y) - wy, from},
-                               {std::max(a.x, b.x) + wx, std::max(a.y, b.y) + wy, to}};
-                };
-                if (filling.wall_count_in(between(first, second, low, high)) == 0) continue;
-                for (double z = low; why.empty() && z < high + 0.5 * dx; z += dx) {
-                    if (filling.soil_count_in(between(first, beside, z - wide, z + wide)) > 0) continue;
-                    const double gap = gap_to_a_wall(scene, {x.x, x.y, z}, int(b), d);
-                    if (gap > 0)
-                        why = fmt::format(
-                            "at ({:.6g}, {:.6g}, {:.6g}) the soil stands {:.2g} m off the wall beside it, on which it should lean", x.x,
-                            x.y, z, gap);
-                }
-            }
-            compare({{x.x + nothing * dx, x.y - nothing * dx, low}, {x.x + 1.25 * dx, x.y + (1 - nothing) * dx, high}});
-            if (!flat) compare({{x.x - nothing * dx, x.y + nothing * dx, low}, {x.x + (1 - nothing) * dx, x.y + 1.25 * dx, high}});
+    for (int b = 0; b < int(scene.bodies.size()); ++b) {
+        if (!rests(scene.bodies[std::size_t(b)])) continue;
+        filling.for_each_stack_of(b, {{-far, -far, -far}, {far, far, far}}, [&](const Lattice::Stack& stack) {
+            const Bystander s{scene, filling, columns, least_share(scene, filling), b, stack};
+            for (const bool along_x : {true, false})
+                if (why.empty() && (along_x || !flat)) why = s.step_up_or_down(along_x);
+            for (const Vector d : {Vector{1, 0, 0}, Vector{-1, 0, 0}, Vector{0, 1, 0}, Vector{0, -1, 0}})
+                if (why.empty() && (d.y == 0 || !flat)) why = s.off_the_wall(d);
         });
+        if (!why.empty()) break;
     }
     return why;
 }

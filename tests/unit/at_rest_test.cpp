@@ -240,6 +240,11 @@ TEST(AtRest, WhereNoClosedFormHoldsItIsSaid)
     EXPECT_THAT(why(made(0.1, {ground, Box{{0, 0, 1}, {1, 0, 1.5}}})), slope); // a terrace
     EXPECT_THAT(why(made(0.1, {Box{{0, 0, 0}, {1, 1, 1}}, Box{{0, 1, 0}, {1, 2, 1.3}}}, 3)), slope);
     EXPECT_THAT(why(made(0.1, {Sphere{{0, 0, 0}, 0.5}}, 3)), slope);
+    // A step where a period ends.
+    auto terraced = made(0.1, {Box{{0, 0, 0}, {1, 0, 1}}, Box{{1.3, 0, 0}, {2, 0, 0.5}}});
+    EXPECT_EQ(why(terraced), "");
+    terraced.space.low = Vector{0, 0, -1}, terraced.space.high = Vector{2, 0, 3}, terraced.space.periodic[0] = true;
+    EXPECT_THAT(why(terraced), slope);
     auto s = made(0.1, {ground});
     s.effects.pore_pressure = PorePressure{{{0, 1}, {2, 1}}, 1000};
     EXPECT_EQ(why(s), "");
