@@ -80,8 +80,15 @@ template <class A> void describe_soil(A& a, const std::string& path, scene::Soil
              {{"compression", scene::Cone::Compression},
               {"extension", scene::Cone::Extension},
               {"plane strain", scene::Cone::PlaneStrain},
-              {"plane strain, no dilation", scene::Cone::PlaneStrainNoDilation}},
-             {.fallback = "\"compression\"", .example = "\"compression\"", .doc = "how the Drucker-Prager cone is fitted to c and phi"});
+              {"plane strain, no dilation", scene::Cone::PlaneStrainNoDilation},
+              {"shear", scene::Cone::Shear}},
+             {.fallback = "\"compression\"",
+              .example = "\"compression\"",
+              .doc = "how the Drucker-Prager cone is fitted to c and phi (docs/theory.md)"});
+    a.choice(path + ".opened_volume", soil.opened_volume, {{"kept", scene::OpenedVolume::Kept}, {"forgotten", scene::OpenedVolume::Forgotten}},
+             {.fallback = "\"kept\"",
+              .example = "\"kept\"",
+              .doc = "\"kept\": soil torn open bears no pressure until the opened volume is closed; \"forgotten\": at once, as published"});
     a.number(path + ".tension_cutoff", soil.tension_cutoff,
              {.unit = "Pa", .range = from(0), .example = "1000.0", .doc = "largest mean tension, at most the cone's apex c cot(phi)"});
     a.number(path + ".dilation_decay", soil.dilation_decay,

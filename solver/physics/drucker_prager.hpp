@@ -32,22 +32,23 @@ template <class V> struct Evolution {
     V residual_alpha, residual_k;
     V per_softening, per_dilation; // 1 over the plastic strain of residual strength, and of dilation's end
     V alpha_psi;
-    V rate_excess, inertial_number, grain, per_grain_density;
+    V fast_alpha, inertial_number, grain, per_grain_density;
     V cutoff;
     /// Shear bands are taken to be 2 h wide; h in m.
     static Evolution from(const Material& m, double h)
     {
         using T = number<V>;
-        return {V(T(m.residual_alpha)),    V(T(m.residual_k)),  V(T(2 * h / m.softening_slip)), V(T(1 / m.dilation_decay)),
-                V(T(m.alpha_psi)),         V(T(m.rate_excess)), V(T(m.inertial_number)),        V(T(m.grain)),
+        return {V(T(m.residual_alpha)),    V(T(m.residual_k)), V(T(2 * h / m.softening_slip)), V(T(1 / m.dilation_decay)),
+                V(T(m.alpha_psi)),         V(T(m.fast_alpha)), V(T(m.inertial_number)),        V(T(m.grain)),
                 V(T(1 / m.grain_density)), V(T(m.cutoff))};
     }
 };
 
 /// The cone of now. Softening (linear in alpha and k) and dilation decay with the plastic shear strain gamma_p:
 ///     alpha = alpha_0 + (alpha_r - alpha_0) min(gamma_p/gamma_r, 1),  k alike,  alpha_psi = alpha_psi_0 max(1 - gamma_p/gamma_d, 0)
-/// mu(I) with the rate of shear |D| = sqrt(2 D':D') and the pressure p (Jop et al. 2006):
-///     alpha *= 1 + (mu_2/mu_s - 1)/(1 + I_0/I),  I = |D| d/sqrt(p/rho_grain)
+/// mu(I) with the rate of shear |D| = sqrt(2 D':D') and the pressure p (Jop et al. 2006): from the softened cone to that of the angle
+/// phi_2, which fast flow reaches whatever strength it has lost (alpha is not proportional to tan(phi) in every cone):
+///     alpha += (slope(cone, phi_2) - alpha)/(1 + I_0/I),  I = |D| d/sqrt(p/rho_grain)
 template <class V>
 KUZURE_INLINE Elastoplastic<V> evolved(const Elastoplastic<V>& soil, const Evolution<V>& e, V plastic_strain, V shear_rate, V pressure)
 {
@@ -58,7 +59,7 @@ KUZURE_INLINE Elastoplastic<V> evolved(const Elastoplastic<V>& soil, const Evolu
     const V fast = slide / (slide + e.inertial_number * sqrt(max(pressure, zero) * e.per_grain_density) + tiny);
     Elastoplastic<V> now = soil;
     now.alpha = fma(softened, e.residual_alpha - soil.alpha, soil.alpha);
-    now.alpha = fma(now.alpha * e.rate_excess, fast, now.alpha);
+    now.alpha = fma(fast, e.fast_alpha - now.alpha, now.alpha);
     now.k = fma(softened, e.residual_k - soil.k, soil.k);
     const V alpha_psi = e.alpha_psi * max(one - plastic_strain * e.per_dilation, zero);
     const V nine_k = V(9) * soil.bulk;

@@ -36,7 +36,7 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
         p[field::velocity].set(i, v);
         p[field::density].set(i, m.density);
         p[field::id].set(i, s.id), p[field::soil].set(i, std::int32_t(body.soil));
-        if (body.stress == scene::InitialStress::AtRest) p[field::stress].set(i, at_rest(s.x, body.soil));
+        if (body.stress == scene::InitialStress::AtRest) p[field::stress].set(i, at_rest(s.x, s.body, body.soil));
     }
 }
 

@@ -1,5 +1,6 @@
 #include "solver/scene/check.hpp"
 #include "solver/core/field.hpp"
+#include "solver/scene/at_rest.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/shape.hpp"
@@ -12,7 +13,7 @@ namespace {
 double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 const char* name_of(Cone cone)
 {
-    static constexpr const char* names[] = {"compression", "extension", "plane strain", "plane strain, no dilation"};
+    static constexpr const char* names[] = {"compression", "extension", "plane strain", "plane strain, no dilation", "shear"};
     return names[int(cone)];
 }
 
@@ -123,14 +124,15 @@ void check_soils(const Scene& scene, Rules& rules)
         if (m.alpha == 0 && !soil.tension_cutoff)
             rules.warning(key, "without friction the cone has no apex, so the soil bears any mean tension; give a "
                                "tension_cutoff if it should not");
-        if (soil.cone == Cone::Compression && scene.dimensions == 2 && m.alpha > 0) {
-            const double s = 3 * m.alpha;
-            rules.warning(key + ".cone", s < 1 ? text("in plane strain the compression cone acts like a friction angle of {:.1f} deg "
-                                                      "instead of {:.4g}; the plane strain cones do not",
-                                                      degrees(std::asin(s)), degrees(soil.friction_angle))
-                                               : "in plane strain the compression cone has no limit at this friction angle; the plane "
-                                                 "strain cones have");
-        }
+        if (soil.cone == Cone::Compression && scene.dimensions == 2 && m.alpha > 0)
+            rules.warning(key + ".cone",
+                          text("in plane strain the compression cone acts like a friction angle of {:.1f} deg on a rough bed "
+                               "(atan 3 alpha) and {} instead of {:.4g}; the plane strain and shear cones are nearer",
+                               degrees(m.angle_on_a_rough_bed()),
+                               m.circle_is_limited()
+                                   ? text("{:.1f} deg by its stress circle (asin 3 alpha)", degrees(m.angle_of_the_stress_circle()))
+                                   : std::string("no limit by its stress circle (3 alpha >= 1)"),
+                               degrees(soil.friction_angle)));
         if (std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) { return b.soil == int(i); }))
             rules.warning(key, "no body is made of this soil");
     }
@@ -187,7 +189,8 @@ void check_space(const Scene& scene, Rules& rules)
         const double period = at(*space.high, axis) - at(*space.low, axis), n = period / space.spacing;
         const double least = 2 * scene.support() * (1 + scene.accuracy.skin);
         if (!(period > 0)) continue;
-        if (std::abs(n - std::round(n)) > 1e-6)
+        const double largest = std::max(std::abs(at(*space.low, axis)), std::abs(at(*space.high, axis)));
+        if (std::abs(n - std::round(n)) > std::max(1e-6, rounding_of(largest) / space.spacing))
             rules.error("space.periodic", text("expected a period of whole spacings along {}, found {:.9g} spacings of {} m; "
                                                "change space.high",
                                                names[axis], n, space.spacing));
@@ -392,7 +395,8 @@ void check_inside(const Scene& scene, Rules& rules)
         const Box box = bounds(shape);
         for (int axis = 0; axis < 3; ++axis) {
             if ((axis == 1 && scene.dimensions == 2) || (only_periodic && !space.periodic[std::size_t(axis)])) continue;
-            const double low = at(*space.low, axis), high = at(*space.high, axis), slack = 1e-6 * space.spacing;
+            const double low = at(*space.low, axis), high = at(*space.high, axis),
+                         slack = std::max(1e-6 * space.spacing, rounding_of(std::max(std::abs(low), std::abs(high))));
             if (at(box.low, axis) < low - slack || at(box.high, axis) > high + slack)
                 return rules.error(key,
                                    text("expected it inside space.low .. space.high = {:.6g} .. {:.6g} m "
@@ -599,6 +603,21 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     if (filling) {
         for (auto& judgement : judge(scene, *filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+            if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess + 1e-9)
+                rules.warning(text("body.{}.{}", b, name_of(scene.bodies[b].shape)),
+                              text("its particles hold {:.2g} % {} mass than its volume would: lattice points and faces do not fit; a "
+                                   "smaller space.spacing, or faces moved by part of one, come nearer",
+                                   100 * std::abs(excess), excess > 0 ? "more" : "less"));
+        if (const auto why = no_closed_form(scene, *filling); !why.empty())
+            for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+                if (scene.bodies[b].stress == InitialStress::AtRest) {
+                    rules.warning(text("body.{}.stress", b),
+                                  text("the stress \"at rest\" is K0 under the column above, which is no equilibrium here: {}; it will "
+                                       "settle at the start, under effects.damping most quietly",
+                                       why));
+                    break;
+                }
         const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",
@@ -608,6 +627,12 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     issues = rules.issues;
     if (!filling) return {};
     return Ready{std::move(scene), std::move(rules.issues), std::move(*filling)};
+}
+
+double excess_of_mass(const Scene& scene, const Filling& filling, int body)
+{
+    const double held = double(filling.body_count(body)) * scene.particle_volume();
+    return held / volume(scene.bodies[std::size_t(body)].shape, scene.dimensions) - 1;
 }
 
 double column_bytes(const Filling& filling)

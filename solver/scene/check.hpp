@@ -41,6 +41,10 @@ struct Ready {
 /// Nothing where check() finds errors; all that it finds is in `issues`.
 std::optional<Ready> ready(Scene, StepLimit, Issues& issues);
 
+/// By how much of it (1) the mass of a body's particles exceeds that of its shape's volume; above `most_excess` either way a warning.
+double excess_of_mass(const Scene&, const Filling&, int body);
+inline constexpr double most_excess = 0.02;
+
 /// Bytes of the columns of all soil particles of a run: the fields of the store, without records and lists.
 double column_bytes(const Filling&);
 

@@ -7,8 +7,11 @@ namespace {
 
 /// A box's side must hold whole spacings within this share of one; two boxes may overlap by as much.
 const double tolerance = 1e-6;
-/// A lattice point this close to a surface, in spacings, lies on it and so not strictly inside.
-const double on_the_surface = 1e-9;
+/// A lattice point this close to a face, in spacings, lies on it; where coordinates are so large that rounding moves them by more,
+/// one within that.
+const double on_the_face = 1e-9;
+/// Where rounding moves coordinates by more than this share of a spacing, nobody can say what belongs where.
+const double most_rounding = 0.01;
 /// More points, or more rows to be stored, than this mean a spacing that is not meant. The rows of all shapes count together: each
 /// takes 40 bytes, and 0.1 microseconds to be found.
 const double most_points = 1e11, most_rows = 2e7;
@@ -22,6 +25,9 @@ Box united(const Box& a, const Box& b)
     return {{std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)},
             {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
 }
+
+/// Depth (m) to which shapes may overlap and still touch, or a box's side may miss whole spacings.
+double slack(const Shape& shape, double spacing, int dimensions) { return std::max(tolerance * spacing, rounding_of(shape, dimensions)); }
 
 /// Side of the thinnest common part of two boxes along the axes that count; negative if they are apart.
 double common(const Box& a, const Box& b, int dimensions)
@@ -142,7 +148,7 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
         const double low = at(outer.low, axis), high = at(outer.high, axis), n = (high - low) / spacing;
         const char name = "xyz"[axis];
         if (!(high > low)) return fmt::format("expected low < high along {}, found {} and {}", name, low, high);
-        if (std::holds_alternative<Box>(shape) && std::abs(n - std::round(n)) > tolerance) {
+        if (std::holds_alternative<Box>(shape) && std::abs(n - std::round(n)) * spacing > slack(shape, spacing, dimensions)) {
             const double less = low + std::floor(n) * spacing, more = low + std::ceil(n) * spacing;
             return fmt::format("expected a whole number of spacings ({} m) a side, found {:.9g} along {}; "
                                "let high.{} be {}{:.9g}",
@@ -150,6 +156,11 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
         }
         points *= n;
     }
+    if (const double rounding = rounding_of(shape, dimensions); rounding > most_rounding * spacing)
+        return fmt::format(
+            "expected coordinates that tell particles {:g} m apart from each other, found such that rounding moves by {:.2g} m; "
+            "move the scene nearer to the origin",
+            spacing, rounding);
     if (points > most_points || rows(shape, spacing, dimensions) > most_rows)
         return fmt::format("expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
                            "is space.spacing in metres?",
@@ -170,6 +181,8 @@ double Lattice::rows(const Shape& shape, double spacing, int dimensions)
 
 Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimensions_(dimensions), spacing_(spacing)
 {
+    on_face_ = std::max(on_the_face * spacing, rounding_of(shape, dimensions));
+    near_ = std::max(tolerance * spacing, 4 * on_face_);
     ensure(problem(shape, spacing, dimensions).empty(), "a shape is filled that cannot be");
     const Box outer = scene::bounds(shape);
     if (std::holds_alternative<Box>(shape)) {
@@ -188,12 +201,12 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimension
         if (dimensions == 3) y_ = side(outer.low.y, outer.high.y);
         const auto inside = [&](std::int64_t kx, std::int64_t ky, std::int64_t kz) {
             const Vector x{coordinate(x_, kx), y_of(ky), coordinate(z_, kz)};
-            return signed_distance(shape, x, dimensions) < -on_the_surface * spacing;
+            return holds(shape, x, dimensions, on_face_);
         };
         // The row through a round shape is one interval. Its ends are estimated, then put right by what lies inside; the distance
         // itself is taken only where the squares do not tell.
         const auto round_row = [&](const Passage& p, std::int64_t ky, std::int64_t kz) {
-            const double near = tolerance * spacing, inner = p.radius - near, outer = p.radius + near;
+            const double inner = p.radius - near_, outer = p.radius + near_;
             if (p.across2 > outer * outer) return Range{0, -1};
             const auto in = [&](std::int64_t kx) {
                 const double dx = coordinate(x_, kx) - p.centre, d2 = dx * dx + p.across2;
@@ -217,17 +230,10 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimension
         // Along the axis of extrusion the first and last layers may lie outside: cut them off, then rows
         // repeat.
         if (const auto* c = std::get_if<Cylinder>(&shape)) {
-            trim(z_, [&](auto k) {
-                const double z = coordinate(z_, k), margin = on_the_surface * spacing;
-                return z > c->base.z + margin && z < c->base.z + c->height - margin;
-            });
+            trim(z_, [&](auto k) { return between(coordinate(z_, k), c->base.z, c->base.z + c->height, on_face_); });
             stride_y_ = 1;
         } else if (const auto* p = std::get_if<Polygon>(&shape)) {
-            if (dimensions == 3)
-                trim(y_, [&](auto k) {
-                    const double y = y_of(k), margin = on_the_surface * spacing;
-                    return y > p->y[0] + margin && y < p->y[1] - margin;
-                });
+            if (dimensions == 3) trim(y_, [&](auto k) { return between(y_of(k), p->y[0], p->y[1], on_face_); });
             stride_z_ = 1;
         } else {
             stride_z_ = count(y_.range), stride_y_ = 1;
@@ -255,7 +261,7 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimension
                 if (const auto p = passage(shape, y_of(ky), coordinate(z_, kz), dimensions)) {
                     if (const Range r = round_row(*p, ky, kz); r.first <= r.last) add(r.first, r.last);
                 } else {
-                    const auto zones = zones_near_surface(shape, y_of(ky), coordinate(z_, kz), tolerance * spacing, dimensions);
+                    const auto zones = zones_near_surface(shape, y_of(ky), coordinate(z_, kz), near_, dimensions);
                     for_each_run(x_.range, zones, [&](std::int64_t first, std::int64_t last) {
                         if (inside(first, ky, kz)) add(first, last);
                     });
@@ -354,9 +360,10 @@ bool Lattice::reaches_into(const Shape& other) const
     const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
     const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
     if (size_ == 0) return false;
+    const double depth = std::max(slack(other, spacing_, dimensions_), 2 * on_face_);
     for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
         for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
-            const double y = y_of(ky), z = coordinate(z_, kz), depth = tolerance * spacing_;
+            const double y = y_of(ky), z = coordinate(z_, kz);
             const auto in = row(kz, ky).intervals;
             if (in.empty() || depth_between_faces(other, y, z, dimensions_) <= depth) continue;
             const auto zones = zones_near_surface(other, y, z, 2 * depth, dimensions_);
@@ -411,7 +418,7 @@ Filling::Survey Filling::survey(const Scene& scene)
         if (p.lattice->size() == 0)
             issues.push_back({Severity::Error,
                               p.key,
-                              fmt::format("expected particles strictly inside, found none at a spacing of {} m; make "
+                              fmt::format("expected particles inside, found none at a spacing of {} m; make "
                                           "the shape larger or space.spacing smaller",
                                           scene.space.spacing),
                               {}});
@@ -423,7 +430,8 @@ Filling::Survey Filling::survey(const Scene& scene)
             const auto &a = pieces[i], &b = pieces[j];
             if (!a.lattice || !b.lattice) continue;
             const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);
-            if (depth <= tolerance * scene.space.spacing) continue;
+            if (depth <= std::max(slack(*a.shape, scene.space.spacing, dimensions), slack(*b.shape, scene.space.spacing, dimensions)))
+                continue;
             const bool boxes = std::holds_alternative<Box>(*a.shape) && std::holds_alternative<Box>(*b.shape);
             // Points of one shape outside another are half a spacing from a box's points, and shapes other
             // than boxes share one lattice: no points strictly inside means no points too close.

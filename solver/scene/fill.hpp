@@ -5,6 +5,7 @@
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/scene/shape.hpp"
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -27,8 +28,9 @@ struct GridPart {
     double at(int axis, std::int64_t k) const { return lattice_coordinate(origin[axis], first[axis] + k, spacing); }
 };
 
-/// The lattice points inside one shape. Order of local ids: z slowest, then y, then x. Boxes keep three
-/// numbers; other shapes keep, for every row along x, the intervals that lie inside.
+/// The lattice points that belong to one shape: n a side of a box from its lower corner; of other shapes those of the one lattice at
+/// (k + 1/2) spacings that holds() gives them, so that a cut or a shift by whole spacings neither loses nor moves a point. Order of
+/// local ids: z slowest, then y, then x. Boxes keep three numbers; other shapes keep, for every row along x, the intervals inside.
 class Lattice {
 public:
     /// Throws Broken if the shape cannot be filled: ask problem() first.
@@ -47,6 +49,13 @@ public:
     /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does
     /// not count.
     template <class Visit> void for_each_in(const Box& region, Visit visit) const;
+    /// Points one above the other without a gap, as a column one spacing wide.
+    struct Stack {
+        double x, y;      // m, its axis
+        double foot, top; // m, half a spacing beyond its lowest and highest point
+    };
+    /// Calls visit(Stack) for the stacks of the points in a closed region; in 2-D its y does not count.
+    template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const;
     /// The points in a closed region where the shape is a box, else nothing.
     std::optional<GridPart> grid_in(const Box& region) const;
     /// True if a lattice point lies strictly inside another shape.
@@ -98,6 +107,7 @@ private:
     int dimensions_;
     double spacing_;
     bool is_box_ = false;
+    double on_face_, near_; // m: nearer than this a point lies on a face, nearer than that it is looked at by itself
     Axis x_, y_, z_;
     std::int64_t stride_z_ = 0, stride_y_ = 0;
     std::vector<std::size_t> row_start_; // first interval of every stored row, and the end
@@ -133,6 +143,17 @@ public:
     {
         for (std::size_t b = 0; b < n_bodies_; ++b)
             lattices_[b].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
+    }
+    /// Calls visit(Lattice::Stack) for the stacks of one body's particles in a closed region.
+    template <class Visit> void for_each_stack_of(int body, const Box& region, Visit visit) const
+    {
+        lattices_[std::size_t(body)].for_each_stack_in(region, visit);
+    }
+    /// Calls visit(Lattice::Stack, int body) for the stacks of soil particles in a closed region.
+    template <class Visit> void for_each_soil_stack_in(const Box& region, Visit visit) const
+    {
+        for (std::size_t b = 0; b < n_bodies_; ++b)
+            lattices_[b].for_each_stack_in(region, [&](const Lattice::Stack& s) { visit(s, int(b)); });
     }
     /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising
     /// id.
@@ -182,6 +203,33 @@ template <class Visit> void Lattice::for_each_in(const Box& region, Visit visit)
                 const std::int64_t a = std::max(in.first, xs.first), b = std::min(in.last, xs.last);
                 for (std::int64_t k = a; k <= b; ++k) visit(first + in.before + (k - in.first), Vector{coordinate(x_, k), y, z});
             }
+        }
+}
+
+template <class Visit> void Lattice::for_each_stack_in(const Box& region, Visit visit) const
+{
+    if (size_ == 0) return;
+    const Range zs = within(z_, region.low.z, region.high.z), xs = within(x_, region.low.x, region.high.x);
+    const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
+    if (count(zs) <= 0) return;
+    const auto has = [&](std::int64_t kx, std::int64_t ky, std::int64_t kz) {
+        const auto in = row(kz, ky).intervals;
+        return std::any_of(in.begin(), in.end(), [&](const Interval& i) { return i.first <= kx && kx <= i.last; });
+    };
+    const auto found = [&](std::int64_t kx, std::int64_t ky, std::int64_t first, std::int64_t last) {
+        visit(Stack{coordinate(x_, kx), y_of(ky), coordinate(z_, first) - 0.5 * spacing_, coordinate(z_, last) + 0.5 * spacing_});
+    };
+    for (std::int64_t ky = ys.first; ky <= ys.last; ++ky)
+        for (std::int64_t kx = xs.first; kx <= xs.last; ++kx) {
+            if (!stride_z_) { // every layer is like the first
+                if (has(kx, ky, zs.first)) found(kx, ky, zs.first, zs.last);
+                continue;
+            }
+            for (std::int64_t first = zs.first, kz = zs.first; kz <= zs.last + 1; ++kz)
+                if (kz > zs.last || !has(kx, ky, kz)) {
+                    if (kz > first) found(kx, ky, first, kz - 1);
+                    first = kz + 1;
+                }
         }
 }
 

@@ -22,7 +22,7 @@ struct Material {
     double residual_alpha, residual_k;
     double softening_slip = std::numeric_limits<double>::infinity(); // m
     double dilation_decay = std::numeric_limits<double>::infinity(); // 1
-    double rate_excess = 0;                                          // tan(phi_2)/tan(phi) - 1
+    double fast_alpha;                                               // slope of the cone through phi_2; alpha without rate friction
     double inertial_number = 1, grain = 0, grain_density = 1;        // I_0, m, kg/m^3
 
     /// True if cone or dilation change with strain or its rate.
@@ -37,6 +37,13 @@ struct Material {
         return std::max(elastic, (1 - root3 * (alpha + k / load)) / (1 + 2 * root3 * alpha));
     }
 
+    /// Slope angle (rad) at which soil on a rough bed starts and stops to flow in shear at constant volume, where sqrt(J2) is the shear
+    /// stress and -I1/3 the pressure on the bed: tan = 3 alpha.
+    double angle_on_a_rough_bed() const { return std::atan(3 * alpha); }
+    /// Friction angle (rad) of the Mohr circle in plane strain at psi = 0: sin = 3 alpha. Where that is 1 or more, no circle is too large.
+    double angle_of_the_stress_circle() const { return std::asin(std::min(3 * alpha, 1.0)); }
+    bool circle_is_limited() const { return 3 * alpha < 1; }
+
     /// Slope alpha of the cone through a friction (or dilation) angle in rad.
     static double slope(scene::Cone cone, double angle)
     {
@@ -50,6 +57,8 @@ struct Material {
             return t / std::sqrt(9 + 12 * t * t);
         case scene::Cone::PlaneStrainNoDilation:
             return s / 3;
+        case scene::Cone::Shear:
+            return t / 3;
         }
         return 0;
     }
@@ -66,6 +75,8 @@ struct Material {
             return 3 * cohesion / std::sqrt(9 + 12 * t * t);
         case scene::Cone::PlaneStrainNoDilation:
             return cohesion * c;
+        case scene::Cone::Shear:
+            return cohesion;
         }
         return 0;
     }
@@ -85,7 +96,7 @@ struct Material {
         m.apex = std::min(m.apex, m.cutoff);
         m.rod_speed = std::sqrt(soil.young / m.density);
         m.at_rest = m.sideways_at_rest(std::numeric_limits<double>::infinity());
-        m.residual_alpha = m.alpha, m.residual_k = m.k;
+        m.residual_alpha = m.alpha, m.residual_k = m.k, m.fast_alpha = m.alpha;
         if (const auto& s = soil.softening) {
             m.residual_alpha = slope(soil.cone, s->friction_angle);
             m.residual_k = strength(soil.cone, s->friction_angle, s->cohesion);
@@ -93,7 +104,7 @@ struct Material {
         }
         if (soil.dilation_decay) m.dilation_decay = *soil.dilation_decay;
         if (const auto& r = soil.rate_friction) {
-            m.rate_excess = soil.friction_angle > 0 ? std::tan(r->friction_angle) / std::tan(soil.friction_angle) - 1 : 0; // or refused
+            m.fast_alpha = slope(soil.cone, r->friction_angle);
             m.inertial_number = r->inertial_number, m.grain = r->grain, m.grain_density = r->grain_density;
         }
         return m;

@@ -36,7 +36,7 @@ struct Polygon {
 using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
 
 // ---- matter ----
-enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation };
+enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation, Shear };
 
 /// Loss of strength with plastic shear. The slip is that across a whole shear band, so the dissipated energy does not
 /// depend on the resolution: bands are taken to be one support, 2 h, wide (Bazant & Oh 1983).
@@ -45,9 +45,9 @@ struct Softening {
     double slip;                             // m, at which the residual strength is reached
     bool operator==(const Softening&) const = default;
 };
-/// Friction that grows with the rate of shear, mu(I) = mu_s + (mu_2 - mu_s)/(1 + I_0/I). Jop, Forterre & Pouliquen (2006).
+/// Friction that grows with the rate of shear, mu(I) = mu_s + (mu_2 - mu_s)/(1 + I_0/I), mu = 3 alpha. Jop, Forterre & Pouliquen (2006).
 struct RateFriction {
-    double friction_angle;  // rad, of fast flow: mu_2 = tan
+    double friction_angle;  // rad, of fast flow: mu_2 = 3 alpha of the soil's cone at this angle
     double inertial_number; // I_0
     double grain;           // m, diameter
     double grain_density;   // kg/m^3

@@ -1,5 +1,6 @@
 #include "solver/scene/shape.hpp"
-#include <limits>
+#include <initializer_list>
+#include <numbers>
 
 namespace kuzure::scene {
 namespace {
@@ -25,6 +26,42 @@ bool encloses(const Polygon& polygon, Point x)
     for (std::size_t k = 0; k < polygon.points.size(); ++k) {
         const Point a = corner(polygon, k), b = corner(polygon, k + 1);
         if ((a.z > x.z) != (b.z > x.z) && x.x < a.x + (x.z - a.z) / (b.z - a.z) * (b.x - a.x)) inside = !inside;
+    }
+    return inside;
+}
+
+/// Half-open ball or disc: x minus its centre, in the order in which coordinates decide.
+bool round_holds(std::initializer_list<double> from_centre, double radius, double tolerance)
+{
+    double r2 = 0;
+    for (const double d : from_centre) r2 += d * d;
+    const double beyond = std::sqrt(r2) - radius;
+    if (std::abs(beyond) > tolerance) return beyond < 0;
+    for (const double d : from_centre)
+        if (std::abs(d) > tolerance) return d < 0;
+    return false;
+}
+
+/// Half-open polygon: the even-odd rule for the point moved by as good as nothing along x and by far less along z. What lies within
+/// the tolerance of the point counts as at it.
+bool polygon_holds(const Polygon& polygon, Point x, double tolerance)
+{
+    const auto above = [&](Point corner) { return corner.z - x.z > tolerance; };
+    bool inside = false;
+    for (std::size_t k = 0; k < polygon.points.size(); ++k) {
+        const Point a = corner(polygon, k), b = corner(polygon, k + 1);
+        if (above(a) == above(b)) continue; // does not pass the point's height
+        bool right;                         // of the moved point
+        if (x.x < std::min(a.x, b.x) - tolerance) right = true;
+        else if (x.x > std::max(a.x, b.x) + tolerance) right = false;
+        else {
+            const Point e = b - a;
+            const double t = std::clamp(dot(x - a, e) / dot(e, e), 0.0, 1.0);
+            const Point d = x - Point{a.x + t * e.x, a.z + t * e.z};
+            const bool on = dot(d, d) <= tolerance * tolerance;
+            right = !on && (cross(e, x - a) > 0) == (e.z > 0);
+        }
+        if (right) inside = !inside;
     }
     return inside;
 }
@@ -82,6 +119,58 @@ Contact contact(const Polygon& polygon, Vector x, int dimensions)
     const auto in_plane = contact_in_plane(polygon, {x.x, x.z});
     if (dimensions == 2) return in_plane;
     return detail::intersect(in_plane, detail::slab(x.y, polygon.y[0], polygon.y[1], {0, 1, 0}));
+}
+
+bool holds(const Shape& shape, Vector x, int dimensions, double tolerance)
+{
+    const bool flat = dimensions == 2;
+    struct {
+        Vector x;
+        bool flat;
+        double tolerance;
+        bool operator()(const Box& b) const
+        {
+            return between(x.x, b.low.x, b.high.x, tolerance) && between(x.z, b.low.z, b.high.z, tolerance) &&
+                   (flat || between(x.y, b.low.y, b.high.y, tolerance));
+        }
+        bool operator()(const Cylinder& c) const
+        {
+            return between(x.z, c.base.z, c.base.z + c.height, tolerance) &&
+                   round_holds({x.x - c.base.x, x.y - c.base.y}, c.radius, tolerance);
+        }
+        bool operator()(const Sphere& s) const
+        {
+            return round_holds({x.x - s.center.x, flat ? 0 : x.y - s.center.y, x.z - s.center.z}, s.radius, tolerance);
+        }
+        bool operator()(const Polygon& p) const
+        {
+            return (flat || between(x.y, p.y[0], p.y[1], tolerance)) && polygon_holds(p, {x.x, x.z}, tolerance);
+        }
+    } of{x, flat, tolerance};
+    return std::visit(of, shape);
+}
+
+double rounding_of(const Shape& shape, int dimensions)
+{
+    const Box b = bounds(shape);
+    double largest = std::max({std::abs(b.low.x), std::abs(b.high.x), std::abs(b.low.z), std::abs(b.high.z)});
+    if (dimensions == 3) largest = std::max({largest, std::abs(b.low.y), std::abs(b.high.y)});
+    return rounding_of(largest);
+}
+
+double volume(const Shape& shape, int dimensions)
+{
+    const bool flat = dimensions == 2;
+    const double pi = std::numbers::pi;
+    struct {
+        bool flat;
+        double pi;
+        double operator()(const Box& b) const { return (b.high.x - b.low.x) * (b.high.z - b.low.z) * (flat ? 1 : b.high.y - b.low.y); }
+        double operator()(const Cylinder& c) const { return pi * c.radius * c.radius * c.height; }
+        double operator()(const Sphere& s) const { return pi * s.radius * s.radius * (flat ? 1 : 4 * s.radius / 3); }
+        double operator()(const Polygon& p) const { return std::abs(area(p)) * (flat ? 1 : p.y[1] - p.y[0]); }
+    } of{flat, pi};
+    return std::visit(of, shape);
 }
 
 Box bounds(const Shape& shape)

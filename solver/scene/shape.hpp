@@ -4,6 +4,7 @@
 #include "solver/scene/parts.hpp"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kuzure::scene {
 
@@ -67,6 +68,17 @@ inline Contact contact(const Shape& shape, Vector x, int dimensions = 3)
 inline double signed_distance(const Shape& shape, Vector x, int dimensions = 3) { return contact(shape, x, dimensions).distance; }
 /// True strictly inside: not on the surface.
 inline bool contains(const Shape& shape, Vector x, int dimensions = 3) { return signed_distance(shape, x, dimensions) < 0; }
+/// Half-open interval: low with it, high without, ends known to the tolerance.
+inline bool between(double x, double low, double high, double tolerance) { return x >= low - tolerance && x < high - tolerance; }
+/// True if a point belongs to a shape with half-open faces: inside, or within `tolerance` (m) of a face that has the interior on the
+/// side of greater coordinates, x then y then z. Of shapes that touch, exactly one has a point of their common face.
+bool holds(const Shape&, Vector x, int dimensions, double tolerance);
+/// How far (m) rounding may have moved what is computed from coordinates of this size (m).
+inline double rounding_of(double coordinate) { return 8 * std::numeric_limits<double>::epsilon() * std::abs(coordinate); }
+/// The same for a shape: by the largest of its coordinates.
+double rounding_of(const Shape&, int dimensions);
+/// Volume (m^3), in 2-D area (m^2).
+double volume(const Shape&, int dimensions);
 /// The smallest box around a shape; in 2-D its y is that of the file and means nothing.
 Box bounds(const Shape&);
 /// "box", "cylinder", "sphere" or "polygon": the scene's key.

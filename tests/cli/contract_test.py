@@ -59,7 +59,11 @@ try:
         check(key in report, f"check --json has {key}")
     check(report["soil_particles"] == 512 and report["wall_particles"] == 28 * 28 * 4, "check counts particles")
     check(report["steps"] == 40 and report["dt"] == 1e-4, "check counts steps")
-    call("check", scene)
+    body, cones = report["bodies"][0], list(report["soils"].values())
+    check(body["particles"] == 512 and body["mass"] > 0 and abs(body["excess_of_mass"]) < 1e-9, f"check weighs a body against its shape's volume: {body}")
+    check(all(0 < c["rough_bed_angle"] < c["stress_circle_angle"] < 90 for c in cones), f"check says what a cone acts like: {cones}")
+    text = call("check", scene).stdout
+    check("the mass of its shape's volume" in text and "atan 3 alpha" in text, "check prints both")
     # ---- run and its files
     call("run", scene, "-o", "out", "--quiet")
     out = os.path.join(work, "out")

@@ -107,18 +107,57 @@ TYPED_TEST(Evolving, DilationDiesOut)
     EXPECT_NEAR(swollen, 3 * Material::from(s).alpha_psi * 0.05 / 2, 2e-4 * swollen);
 }
 
+const scene::Cone cones[] = {scene::Cone::Compression, scene::Cone::Extension, scene::Cone::PlaneStrain, scene::Cone::PlaneStrainNoDilation,
+                             scene::Cone::Shear};
+
+// In every cone: from its own slope at phi to its own slope at phi_2, in between as mu(I).
 TYPED_TEST(Evolving, FrictionGrowsWithTheInertialNumber)
 {
     auto s = clay();
     s.cohesion = 0;
     s.rate_friction = scene::RateFriction{33 * degree, 0.3, 1e-3, 2600};
     const double p = 1e4;
-    for (const double I : {1e-4, 0.03, 0.3, 3.0, 1e4}) {
-        const double rate = I * std::sqrt(p / 2600) / 1e-3;
-        SimpleShear<TypeParam> point(s, 0.05, p);
-        for (int k = 0; k < 2000; ++k) point.shear(0.05 / 2000, rate);
-        const double mu_s = std::tan(20 * degree), mu_2 = std::tan(33 * degree), mu = mu_s + (mu_2 - mu_s) / (1 + 0.3 / I);
-        EXPECT_NEAR(point.tau() / (3 * Material::from(s).alpha * p), mu / mu_s, 1e-9) << "I = " << I;
+    for (const auto cone : cones) {
+        s.cone = cone;
+        const double slow = Material::slope(cone, 20 * degree), fast = Material::slope(cone, 33 * degree);
+        for (const double I : {1e-4, 0.03, 0.3, 3.0, 1e4}) {
+            const double rate = I * std::sqrt(p / 2600) / 1e-3;
+            SimpleShear<TypeParam> point(s, 0.05, p);
+            for (int k = 0; k < 2000; ++k) point.shear(0.05 / 2000, rate);
+            EXPECT_NEAR(point.tau() / (3 * p), slow + (fast - slow) / (1 + 0.3 / I), 1e-9 * fast) << "I = " << I << ", cone " << int(cone);
+        }
+    }
+}
+
+// The cone "shear" is Jop's definition itself: tau = mu(I) p with mu = tan(phi).
+TYPED_TEST(Evolving, TheShearConeIsTheLawAsPublished)
+{
+    auto s = clay();
+    s.cohesion = 0, s.cone = scene::Cone::Shear, s.friction_angle = std::atan(0.382);
+    s.rate_friction = scene::RateFriction{std::atan(0.6435), 0.279, 1e-3, 2600};
+    const double p = 1e4, I = 0.1;
+    SimpleShear<TypeParam> point(s, 0.05, p);
+    for (int k = 0; k < 2000; ++k) point.shear(0.05 / 2000, I * std::sqrt(p / 2600) / 1e-3);
+    EXPECT_NEAR(point.tau() / p, 0.382 + (0.6435 - 0.382) / (1 + 0.279 / I), 1e-9);
+}
+
+// Soil that has lost strength and flows fast has the friction of fast flow, and half way it is half way from what is left.
+TYPED_TEST(Evolving, RateFrictionStartsFromTheSoftenedCone)
+{
+    auto s = clay();
+    s.softening = scene::Softening{5e3, 10 * degree, 0.02};
+    s.rate_friction = scene::RateFriction{33 * degree, 0.3, 1e-3, 2600};
+    const double h = 0.05, p = 1e4;
+    for (const auto cone : cones) {
+        s.cone = cone;
+        const double lost = Material::slope(cone, 10 * degree), fast = Material::slope(cone, 33 * degree);
+        const double k = Material::strength(cone, 10 * degree, 5e3);
+        for (const double I : {1e-9, 0.3, 1e9}) {
+            SimpleShear<TypeParam> point(s, h, p);
+            for (int n = 0; n < 20000; ++n) point.shear(1.0 / 20000, I * std::sqrt(p / 2600) / 1e-3);
+            ASSERT_GT(point.plastic_strain, 0.02 / (2 * h));
+            EXPECT_NEAR(point.tau(), 3 * p * (lost + (fast - lost) / (1 + 0.3 / I)) + k, 1e-7 * point.tau()) << "I = " << I;
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 // Rules beyond single keys, the choice of effects, and the numbers derived from a soil.
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -61,22 +62,43 @@ TEST(Material, ElasticNumbersOfTheSeed)
 TEST(Material, ConesOfTheReferenceTable)
 {
     const struct {
-        double phi, compression, extension, plane_strain, no_dilation;
-    } table[] = {{15, .1090, .0917, .0853, .0863}, {19.8, .1470, .1172, .1108, .1129}, {25, .1893, .1426, .1369, .1409},
-                 {30, .2309, .1650, .1601, .1667}, {35, .2730, .1853, .1815, .1912},   {40, .3149, .2038, .2009, .2143}};
+        double phi, compression, extension, plane_strain, no_dilation, shear;
+    } table[] = {{15, .1090, .0917, .0853, .0863, .0893}, {19.8, .1470, .1172, .1108, .1129, .1200},
+                 {25, .1893, .1426, .1369, .1409, .1554}, {30, .2309, .1650, .1601, .1667, .1925},
+                 {35, .2730, .1853, .1815, .1912, .2334}, {40, .3149, .2038, .2009, .2143, .2797}};
     for (const auto& row : table) {
         EXPECT_NEAR(Material::slope(Cone::Compression, radians(row.phi)), row.compression, 6e-5);
         EXPECT_NEAR(Material::slope(Cone::Extension, radians(row.phi)), row.extension, 6e-5);
         EXPECT_NEAR(Material::slope(Cone::PlaneStrain, radians(row.phi)), row.plane_strain, 6e-5);
         EXPECT_NEAR(Material::slope(Cone::PlaneStrainNoDilation, radians(row.phi)), row.no_dilation, 6e-5);
+        EXPECT_NEAR(Material::slope(Cone::Shear, radians(row.phi)), row.shear, 6e-5);
     }
+}
+
+// What a friction angle means in each cone: the slope on a rough bed and the stress circle, of which one is phi itself where the cone is
+// made for it.
+TEST(Material, AnglesThatAConeActsLike)
+{
+    Soil soil = column().soils[0];
+    const auto with = [&](Cone cone) { return soil.cone = cone, Material::from(soil); };
+    EXPECT_NEAR(with(Cone::Shear).angle_on_a_rough_bed(), radians(25), 1e-12);
+    EXPECT_NEAR(with(Cone::Shear).angle_of_the_stress_circle(), radians(27.793), 1e-4);
+    EXPECT_NEAR(with(Cone::PlaneStrainNoDilation).angle_of_the_stress_circle(), radians(25), 1e-12);
+    EXPECT_NEAR(with(Cone::PlaneStrain).angle_on_a_rough_bed(), radians(22.322), 1e-4); // a pile came to rest at 22.58
+    EXPECT_NEAR(with(Cone::PlaneStrain).angle_of_the_stress_circle(), radians(24.241), 1e-4);
+    for (const auto cone : {Cone::Compression, Cone::Extension, Cone::PlaneStrain, Cone::PlaneStrainNoDilation, Cone::Shear}) {
+        EXPECT_LT(with(cone).angle_on_a_rough_bed(), with(cone).angle_of_the_stress_circle());
+        EXPECT_TRUE(with(cone).circle_is_limited());
+    }
+    soil.friction_angle = radians(45.1);
+    EXPECT_FALSE(with(Cone::Shear).circle_is_limited());
 }
 
 TEST(Material, AllConesShareTheApex)
 {
     Soil soil = column().soils[0];
     soil.cohesion = 5000;
-    for (const auto cone : {Cone::Compression, Cone::Extension, Cone::PlaneStrain, Cone::PlaneStrainNoDilation}) {
+    for (const auto cone : {Cone::Compression, Cone::Extension, Cone::PlaneStrain, Cone::PlaneStrainNoDilation, Cone::Shear}) {
         soil.cone = cone;
         EXPECT_NEAR(Material::from(soil).apex, 3 * 5000 / std::tan(radians(25)), 1e-8);
     }
@@ -109,6 +131,8 @@ TEST(Scene, ArtificialStressDecidesItself)
                                         {80.0, Cone::PlaneStrain, false},
                                         {80.0, Cone::Extension, false},
                                         {59.9, Cone::PlaneStrainNoDilation, false},
+                                        {40.8, Cone::Shear, false},
+                                        {40.9, Cone::Shear, true},
                                         {60.1, Cone::PlaneStrainNoDilation, true}}) {
         s.soils[0].friction_angle = radians(phi), s.soils[0].cone = cone;
         resolve(s);
@@ -198,7 +222,13 @@ TEST(Scene, DoubtfulScenesAreWarnedAbout)
     EXPECT_THAT(warning(s, "effects.damping.until"), HasSubstr("beyond the end"));
     s = column();
     s.dimensions = 2;
-    EXPECT_THAT(warning(s, "soil.sand.cone"), HasSubstr("acts like a friction angle of 34.6 deg"));
+    EXPECT_THAT(warning(s, "soil.sand.cone"), AllOf(HasSubstr("29.6 deg on a rough bed"), HasSubstr("34.6 deg by its stress circle")));
+    s.soils[0].friction_angle = radians(40);
+    EXPECT_THAT(warning(s, "soil.sand.cone"), HasSubstr("43.4 deg on a rough bed (atan 3 alpha) and 70.8 deg by its stress circle"));
+    s.soils[0].friction_angle = radians(45);
+    EXPECT_THAT(warning(s, "soil.sand.cone"), HasSubstr("no limit by its stress circle"));
+    s.soils[0].cone = Cone::Shear;
+    EXPECT_EQ(warning(s, "soil.sand.cone"), "nothing");
 }
 
 TEST(Scene, TwoDimensionsIgnoreY)
@@ -209,10 +239,27 @@ TEST(Scene, TwoDimensionsIgnoreY)
     s.bodies[0].shape = Box{{0, 9, 0}, {1, -3.33, 1}};
     s.space.low = Vector{-1, 5, -1}, s.space.high = Vector{2, -5, 2};
     EXPECT_TRUE(check(s).empty());
-    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {0, 1}}, {}};
+    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {}};
     EXPECT_TRUE(check(s).empty());
     s.bodies[0].velocity.y = 1;
     EXPECT_NE(error(s, "body.0.velocity"), "nothing");
+}
+
+TEST(Scene, MassIsHeldAgainstTheShapesVolume)
+{
+    auto s = column();
+    EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 0, 1e-12);
+    // Ten rows of 9 to 0 points: the slanted face lies on lattice points and looks to greater coordinates.
+    s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {0, 1}}, {0, 1}};
+    EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 450.0 / 500 - 1, 1e-12);
+    EXPECT_THAT(warning(s, "body.0.polygon"), HasSubstr("hold 10 % less mass than its volume would"));
+    s.bodies[0].shape = Polygon{{{1, 1}, {0, 1}, {1, 0}}, {0, 1}};
+    EXPECT_THAT(warning(s, "body.0.polygon"), HasSubstr("hold 10 % more mass"));
+    s.bodies[0].shape = Sphere{{0, 0, 5}, 1};
+    EXPECT_EQ(warning(s, "body.0.sphere"), "nothing");
+    EXPECT_NEAR(volume(s.bodies[0].shape, 3), 4.18879, 1e-5);
+    EXPECT_NEAR(volume(s.bodies[0].shape, 2), 3.14159, 1e-5);
+    EXPECT_NEAR(volume(Cylinder{{0, 0, 0}, 2, 0.5}, 3), 6.28318, 1e-5);
 }
 
 TEST(Scene, WallsMayLeaveTheSpaceButNotThePeriod)

@@ -41,6 +41,9 @@ tests/validation/validate.sh --publish  # and writes this page and its figures
 | MAT-10 hypoelastic shear to gamma = 4 | G sin, G (1 - cos); second order in the increment | 1e-5 | same |
 | MAT-11 dilatancy, psi = 10 deg | 3 alpha_psi = 0.17278 | 1e-10 | same |
 | MAT-12 work split on 200 random paths | W = W_el + W_p; F <= 0; W_p never falls | 1e-10 | same |
+| rate friction in five cones, fast and slow, softened | alpha_1 + (alpha_2 - alpha_1)/(1 + I_0/I) | 1e-9 (1e-7 softened) | `tests/unit/evolution_test.cpp` |
+| filling: 700 random cuts of polygons, cylinders and boxes; 300 shifts, half of them to 4,000 km | the whole's points, each once, the same bits; the same ids and relative places | exact; rounding | `tests/unit/fill_test.cpp` |
+| stress "at rest" on 300 random stacks: soils, heights, shifts, gaps | weight of what touches, by the covered part of the column | 2e-6 | `tests/unit/at_rest_test.cpp` |
 | pair sums of every compiled model against all pairs by the textbook | lattice, jitter 0.3, disorder, lonely/coincident/tensile particles, 2-D | 2e-8 (finite kick) | `tests/unit/pass_test.cpp` |
 | lanes against plain loop; widths 2, 4, 16; skins 0.02 to 0.5 | same bits | exact | same |
 | momentum of pair forces | 0 | 1e-11 | same |

@@ -6,14 +6,18 @@
 #include "solver/app/predict.hpp"
 #include "solver/app/study/dial.hpp"
 #include "solver/kernels/pair_model.hpp"
+#include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 namespace kuzure {
 
 namespace {
+
+const double degrees = 180 / std::numbers::pi;
 
 /// kuzure check --accuracy: settings from the measured table.
 Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy, bool json)
@@ -32,6 +36,57 @@ Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy
     if (comm.rank() == 0)
         fmt::print("{}", json ? study::to_json(proposal, wanted, seconds).dump(2) + "\n" : study::to_text(proposal, wanted, seconds));
     return Exit::Ok;
+}
+
+const char* mass_unit(const Scene& s) { return s.dimensions == 2 ? "kg/m" : "kg"; }
+
+/// Mass (kg, in 2-D kg/m) of one body's particles.
+double mass_of(const Scene& s, const scene::Filling& f, int body)
+{
+    const auto& soil = s.soils[std::size_t(s.bodies[std::size_t(body)].soil)];
+    return double(f.body_count(body)) * s.particle_volume() * soil.density;
+}
+
+/// What each body holds against its shape's volume, and what friction each soil's cone means.
+nlohmann::ordered_json bodies_json(const Scene& s, const scene::Filling& f)
+{
+    auto all = nlohmann::ordered_json::array();
+    for (int b = 0; b < int(s.bodies.size()); ++b)
+        all.push_back({{"particles", f.body_count(b)}, {"mass", mass_of(s, f, b)}, {"excess_of_mass", scene::excess_of_mass(s, f, b)}});
+    return all;
+}
+nlohmann::ordered_json soils_json(const Scene& s)
+{
+    auto all = nlohmann::ordered_json::object();
+    for (const auto& soil : s.soils) {
+        const auto m = Material::from(soil);
+        all[soil.name] = {{"alpha", m.alpha},
+                          {"k", m.k},
+                          {"rough_bed_angle", m.angle_on_a_rough_bed() * degrees},
+                          {"stress_circle_angle", m.circle_is_limited() ? nlohmann::ordered_json(m.angle_of_the_stress_circle() * degrees)
+                                                                        : nlohmann::ordered_json()}};
+    }
+    return all;
+}
+std::string bodies_and_soils_text(const Scene& s, const scene::Filling& f)
+{
+    std::string text;
+    for (int b = 0; b < int(s.bodies.size()); ++b) {
+        const double excess = scene::excess_of_mass(s, f, b);
+        text +=
+            fmt::format("  body.{:<7}{} particles, {:.4g} {}: {} its shape's volume\n", b, f.body_count(b), mass_of(s, f, b), mass_unit(s),
+                        std::abs(excess) < 5e-7 ? "the mass of"
+                                                : fmt::format("{:.2g} % {} than", 100 * std::abs(excess), excess > 0 ? "more" : "less"));
+    }
+    for (const auto& soil : s.soils) {
+        const auto m = Material::from(soil);
+        text += fmt::format(
+            "  soil.{:<7}alpha {:.4g}, k {:.4g} Pa: in plane strain at psi = 0 a slope on a rough bed of {:.1f} deg (atan 3 alpha), "
+            "{} by the stress circle (asin 3 alpha)\n",
+            soil.name, m.alpha, m.k, m.angle_on_a_rough_bed() * degrees,
+            m.circle_is_limited() ? fmt::format("{:.1f} deg", m.angle_of_the_stress_circle() * degrees) : "no limit");
+    }
+    return text;
 }
 
 /// As JSON has whole numbers.
@@ -110,6 +165,8 @@ void add_check(CLI::App& app, Action& chosen)
                                          {"disk_bytes", whole(e.disk())},
                                          {"predicted_seconds", time.seconds},
                                          {"predicted_interval", {time.low, time.high}},
+                                         {"bodies", bodies_json(s, filling)},
+                                         {"soils", soils_json(s)},
                                          {"effects", io::effects_json(s.notes)},
                                          {"numbers", numbers},
                                          {"warnings", warnings}};
@@ -123,6 +180,7 @@ void add_check(CLI::App& app, Action& chosen)
             fmt::print("  pair model  {}\n", model->name());
             fmt::print("  memory      {} in all, disk {}\n", bytes_text(memory), bytes_text(e.disk()));
             fmt::print("  time        about {} on {}\n\n", forecast_text(time), where_text);
+            fmt::print("{}\n", bodies_and_soils_text(s, filling));
             for (const auto& n : s.notes) fmt::print("  {:<4}{}: {}\n", n.on ? "on" : "off", n.name, n.why);
             fmt::print("\n");
             for (const auto& n : judgements) fmt::print("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);
