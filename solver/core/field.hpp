@@ -34,6 +34,9 @@ inline constexpr struct Stress : Field<"stress", "Pa", Shape::Symmetric> {
 } stress;
 inline constexpr struct PlasticStrain : Field<"plastic_strain", "1", Shape::Scalar> {
 } plastic_strain;
+// Only where a soil remembers: volume strain that tension at the apex has opened.
+inline constexpr struct OpenedVolume : Field<"opened_volume", "1", Shape::Scalar> {
+} opened_volume;
 // Of the staggered scheme, at t: what the next half kick needs; the stress rate of diffusion, for the next strain.
 inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vector> {
 } acceleration;
@@ -68,8 +71,9 @@ inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::in
 /// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
 enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
-using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::Acceleration,
-                             field::StressRate, field::WallSlip, field::WallPressure, field::HalfVelocity, field::HalfDensity,
-                             field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+using AllFields =
+    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
+               field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::HalfVelocity, field::HalfDensity,
+               field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -403,7 +403,8 @@ private:
         // half before the turn and half after: second order in time
         const Sym3<U> loading = half * (hooke(kick * r.D, soil) + kick * r.diffusion);
         const Sym3<U> sigma_h = p[field::half_stress].template load<U>(lanes.at);
-        a.h = return_to_cone(rotate(spin_increment(r.L, kick), sigma_h + loading) + loading, soil);
+        const U opened = in.remembering ? p[field::opened_volume].template load<U>(lanes.at) : U(0.0);
+        a.h = return_to_cone(rotate(spin_increment(r.L, kick), sigma_h + loading) + loading, soil, opened);
         return a;
     }
     /// Values at the end of the step: half a step on from there.
@@ -413,9 +414,10 @@ private:
         a.x = fma(dt, a.v_h, std::as_const(*in.particles)[field::position].template load<U>(lanes.at));
         a.v = fma(half_dt, r.a, a.v_h);
         a.rho = fma(half_dt, r.rho_rate, a.rho_h);
-        a.sigma = return_to_cone(
-                      a.h.sigma + spin(spin_increment(r.L, half_dt), a.h.sigma) + hooke(half_dt * r.D, soil) + half_dt * r.diffusion, soil)
-                      .sigma;
+        a.sigma =
+            return_to_cone(a.h.sigma + spin(spin_increment(r.L, half_dt), a.h.sigma) + hooke(half_dt * r.D, soil) + half_dt * r.diffusion,
+                           soil, a.h.opened)
+                .sigma;
     }
     template <class Mine>
     KUZURE_INLINE void keep_sleepers(const StepInput& in, const Lanes& lanes, Mine mine, const Before& now, After& a) const
@@ -426,6 +428,7 @@ private:
         a.rho_h = select(mine, a.rho_h, p[field::half_density].template load<U>(lanes.at)), a.rho = select(mine, a.rho, now.rho);
         a.h.sigma = select(mine, a.h.sigma, p[field::half_stress].template load<U>(lanes.at)), a.sigma = select(mine, a.sigma, now.sigma);
         a.h.shear_strain = select(mine, a.h.shear_strain, U(0.0));
+        if (in.remembering) a.h.opened = select(mine, a.h.opened, p[field::opened_volume].template load<U>(lanes.at));
     }
     KUZURE_INLINE void write_state(const StepInput& in, const Lanes& lanes, const After& a) const
     {
@@ -438,6 +441,7 @@ private:
         p[field::half_stress].store(at, a.h.sigma, n), p[field::stress].store(at, a.sigma, n);
         const auto plastic = p[field::plastic_strain];
         plastic.store(at, plastic.template load<U>(at) + a.h.shear_strain, n);
+        if (in.remembering) p[field::opened_volume].store(at, a.h.opened, n);
     }
     /// Records for the next step's pairs.
     KUZURE_INLINE void write_records(const Lanes& lanes, const LaneSoil<U>& soil, const After& a)
@@ -497,12 +501,13 @@ private:
         if constexpr (M::tensile || M::diffusive)
             tally.energy.stabilising -= select(mine, quantized(volume * (r.diffused + r.stressed) * kick, magic), zero);
         tally.energy.wall += select(mine, walled, zero);
-        const Vec3<U> moved = a.x - p[field::sorted_position].template load<U>(lanes.at);
+        const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
+        const Vec3<U> moved = (a.x - p[field::sorted_position].template load<U>(lanes.at)) - flown, drift = a.v_h - frame;
         const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
         meet(tally.maxima.acceleration2, dot(r.a, r.a));
         meet(tally.maxima.displacement2, dot(moved, moved));
         meet(tally.maxima.speed2, dot(a.v, a.v));
-        meet(tally.maxima.drift2, dot(a.v_h, a.v_h));
+        meet(tally.maxima.drift2, dot(drift, drift));
         meet(tally.maxima.density_ratio, max(a.rho / soil.rho0, soil.rho0 / a.rho));
         meet(tally.maxima.signal, fma(U(h_), sqrt(contract(r.D, r.D)), soil.c));
         const U finite = fma(zero, dot(r.a, r.a), fma(zero, dot(a.v, a.v), fma(zero, trace(a.sigma), zero * a.rho)));

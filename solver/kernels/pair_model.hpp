@@ -32,8 +32,11 @@ struct StepInput {
     double kick;       // half of the step before and half of this one, s
     double next;       // length of the step to come, s
     StepForces forces;
-    bool evolving = false; // a soil's cone changes with strain or its rate
-    double energy_unit;    // J
+    bool evolving = false;    // a soil's cone changes with strain or its rate
+    bool remembering = false; // a soil remembers opened volume: `particles` has field::opened_volume
+    Vector frame{};           // m/s, how fast the whole scene flies past; largest speeds and displacements are against it
+    Vector frame_way{};       // m, how far it will have flown since the last sort, after the step whose displacement is told
+    double energy_unit;       // J
     std::optional<Vector> low = {}, high = {};
     SleepStage sleep = SleepStage::Off;            // else `particles` has field::activity
     double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest

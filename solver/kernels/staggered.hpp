@@ -391,7 +391,8 @@ private:
         // half before the turn and half after: second order in time, and exact in energy
         const Sym3<U> strain = dt * D;
         const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
-        const auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law);
+        const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
+        auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.shear_strain, viscous};
@@ -400,12 +401,14 @@ private:
         if (in.sleep == SleepStage::Frozen) {
             next.sigma = select(mine, next.sigma, sigma), next.rho = select(mine, next.rho, rho);
             next.plastic_strain = select(mine, next.plastic_strain, plastic);
+            mapped.opened = select(mine, mapped.opened, opened);
             next.viscous = select(mine, next.viscous, was[field::acceleration].template load<U>(lanes.at));
         }
         if (in.dt > 0) { // at the start of a run only the viscous force is wanted
             p[field::stress].store(lanes.at, next.sigma, lanes.n);
             p[field::density].store(lanes.at, next.rho, lanes.n);
             p[field::plastic_strain].store(lanes.at, next.plastic_strain, lanes.n);
+            if (in.remembering) p[field::opened_volume].store(lanes.at, mapped.opened, lanes.n);
         } else next.sigma = sigma, next.rho = rho;
         p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
         write_stresses(in, lanes, soil, next);
@@ -471,6 +474,10 @@ private:
         Cluster<V> i = Base::cluster_at(in, cluster, counted_before);
         if (i.moving == 0) return;
         i.position = positions_of<V>(kinematics_.data(), i.first);
+        if constexpr (M::tensile) {
+            const auto v = std::as_const(*in.particles)[field::velocity];
+            i.v = {load_narrow<V>(v.column[0] + i.first), load_narrow<V>(v.column[1] + i.first), load_narrow<V>(v.column[2] + i.first)};
+        }
         const auto pruned = in.lists->pruned(cluster);
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
         ForceSums<Lane> sums;
@@ -495,8 +502,17 @@ private:
         const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
         const V zero(T(0)), one(T(1));
         bool tension = false; // one of the cluster's particles is in tension
-        if constexpr (M::tensile)
-            for (int l = 0; l < i.count; ++l) tension = tension || tension_[i.first + l].any != 0;
+        Sym3<V> tau{};
+        if constexpr (M::tensile) {
+            T rows[6][W];
+            for (int l = 0; l < W; ++l) {
+                const Tension<T>& t = tension_[i.first + std::min(l, i.count - 1)];
+                tension = tension || t.any != 0;
+                const T of[6] = {t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
+                for (int q = 0; q < 6; ++q) rows[q][l] = of[q];
+            }
+            tau = {load<V>(rows[0]), load<V>(rows[1]), load<V>(rows[2]), load<V>(rows[3]), load<V>(rows[4]), load<V>(rows[5])};
+        }
         Batch<V> batch;
         ForceSums<V> sums{};
         V inside = zero;
@@ -514,7 +530,11 @@ private:
                 const V t = max(support - inv.root, zero);
                 const V w = model_.kernel.shape(t, inv.root, inv.inverse_root) * records[number].volume;
                 e.grad = w * r;
-                if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                if constexpr (M::tensile) {
+                    e.w = model_.kernel.value(t);
+                    const Kinematics<T>& j = places[number];
+                    e.v = Vec3<V>{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+                }
                 if constexpr (M::diffusive) {
                     e.q = w * (r2 / (r2 + softening));
                     const Vector g = model_.stress_diffusion.gravity;
@@ -524,7 +544,7 @@ private:
             // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
             StressForce{}.add(
                 sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
-            if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+            if constexpr (M::tensile) model_.artificial_stress.add_opposing(sums, batch, tension_.data(), tau, tension);
             if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
         }
         widen<V>(sums, out);
@@ -612,12 +632,14 @@ private:
         if (walled) take(tally.energy.wall, tally.later.wall, wall);
         if (in.forces.damping > 0) take(tally.energy.damping, tally.later.damping, -(half * mu) * (u + coming));
         // ---- maxima; displacement and drift are those of the step to come
-        const Vec3<U> moved = fma(next, coming, x) - was[field::sorted_position].template load<U>(lanes.at);
+        const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
+        const Vec3<U> moved = (fma(next, coming, x) - was[field::sorted_position].template load<U>(lanes.at)) - flown,
+                      drift = coming - frame;
         const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
         meet(tally.maxima.acceleration2, dot(a, a));
         meet(tally.maxima.displacement2, dot(moved, moved));
         meet(tally.maxima.speed2, dot(v, v));
-        meet(tally.maxima.drift2, dot(coming, coming));
+        meet(tally.maxima.drift2, dot(drift, drift));
         tally.poison += select(mine, fma(zero, dot(a, a), fma(zero, dot(v, v), zero * dot(x, x))), zero);
         if (in.low) {
             double at[3][16];

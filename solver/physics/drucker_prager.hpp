@@ -14,6 +14,7 @@ template <class V> struct Elastoplastic {
     V nine_k_alpha_psi;    // 9 K alpha_psi: fall of I1 per unit of plastic multiplier
     V inverse_denominator; // 1/(G + 9 K alpha alpha_psi)
     V apex;                // largest I1 that the soil bears, Pa
+    V remembers;           // 1: opened volume bears no pressure until it is closed; 0: at once
     static Elastoplastic from(const Material& m)
     {
         using T = number<V>;
@@ -23,7 +24,8 @@ template <class V> struct Elastoplastic {
                 V(T(m.k)),
                 V(T(9 * m.bulk * m.alpha_psi)),
                 V(T(1 / (m.shear + 9 * m.bulk * m.alpha * m.alpha_psi))),
-                V(T(m.apex))};
+                V(T(m.apex)),
+                V(T(m.remembers))};
     }
 };
 
@@ -123,13 +125,16 @@ template <class V> struct Yielded {
     Sym3<V> sigma;
     V shear_strain; // increment of the plastic multiplier
     V work;         // sigma : d(eps_p), J/m^3
+    V opened;       // volume strain that tension at the apex has opened and pressure has not closed
 };
 
 /// Bring an elastic trial stress back to the cone, exactly, for any increment, dilation and apex or tension cut-off:
 ///     d_lambda = <F>/(G + 9 K alpha alpha_psi),  I1 = min(I1_tr - 9 K alpha_psi d_lambda, apex),
 ///     s = s_tr min(1, (k - alpha I1)/sqrt(J2_tr)).
-/// Bui et al. (2008) with the return map of de Souza Neto et al. (2008).
-template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const Elastoplastic<V>& soil)
+/// Bui et al. (2008) with the return map of de Souza Neto et al. (2008). What tension opens at the apex is remembered, and I1 stays at zero
+/// under pressure until it is closed (Tampubolon et al. 2017; Dunatunga & Kamrin 2015): soil torn apart keeps its volume.
+///     opened += (I1 - apex)+/(3 K);  closed = min(opened, (-I1)+/(3 K)),  I1 += 3 K closed,  opened -= closed.
+template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const Elastoplastic<V>& soil, V opened = V(0))
 {
     const V third(number<V>(1.0 / 3)), one(1);
     const V I1_trial = trace(trial);
@@ -137,7 +142,11 @@ template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const 
     const V shear2 = J2(s);
     const V shear = sqrt(shear2);
     const V overshoot = max(fma(soil.alpha, I1_trial, shear) - soil.k, V(0));
-    const V I1 = min(fnma(soil.nine_k_alpha_psi, overshoot * soil.inverse_denominator, I1_trial), soil.apex);
+    const V I1_cone = fnma(soil.nine_k_alpha_psi, overshoot * soil.inverse_denominator, I1_trial);
+    const V I1_borne = min(I1_cone, soil.apex), zero(0), three_k = V(3) * soil.bulk;
+    const V closed = min(opened, max(-I1_borne, zero) / three_k);
+    const V I1 = fma(three_k, closed, I1_borne);
+    const V open = soil.remembers * (opened + max(I1_cone - soil.apex, zero) / three_k - closed);
     const V limit = max(fnma(soil.alpha, I1, soil.k), V(0));
     const V tiny(number<V>(1e-280)); // the quotient stays finite
     const V keep = min(limit / max(shear, tiny), one);
@@ -145,7 +154,7 @@ template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const 
     // keep = 1 in the elastic range gives exactly zero work and strain.
     const V lost = one - keep;
     const V work = fma(keep * lost, shear2 / soil.shear, I1 * (I1_trial - I1) / (V(9) * soil.bulk));
-    return {plus_isotropic(keep * s, I1 * third), lost * shear / soil.shear, work};
+    return {plus_isotropic(keep * s, I1 * third), lost * shear / soil.shear, work, open};
 }
 
 } // namespace kuzure

@@ -21,6 +21,10 @@ struct Clock {
     // Steps are the scene's times step_scale since base_step, which began at base_time: 1, 0, 0 unless a retry halved them.
     double step_scale = 1, base_time = 0; // 1, s
     std::int64_t base_step = 0;
+    Vector frame{};             // m/s, how fast the whole scene flies past
+    Vector frame_way{};         // m, flown with the frame since the last sort
+    double largest_energy = 0;  // J, that the guard has met: kinetic + elastic + potential drop, and the kinetic energy at the start
+    EnergySums largest_taken{}; // J, the most that each has taken
     std::int64_t inspected = 0; // step of the guard's last inspection
 };
 

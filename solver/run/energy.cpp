@@ -1,5 +1,7 @@
 #include "solver/run/energy.hpp"
+#include "solver/core/ensure.hpp"
 #include <bit>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace kuzure {
@@ -31,6 +33,26 @@ StateEnergy state_energy(const Team& team, const Particles& p, std::span<const M
     double sums[3] = {kinetic, potential, elastic};
     team.sum(std::span<double>(sums));
     return {sums[0], sums[1], sums[2]};
+}
+
+namespace {
+[[noreturn]] void outgrown()
+{
+    throw NumbersFailed("an energy has outgrown its ledger: it is many times what the scene's heights and speeds allow. Remedy: a smaller "
+                        "time.step or accuracy.cfl");
+}
+} // namespace
+
+std::int64_t sum_of_units(std::int64_t units, double more)
+{
+    if (!(std::fabs(more) < 0x1p62)) outgrown();
+    return sum_of_units(units, std::int64_t(more));
+}
+std::int64_t sum_of_units(std::int64_t units, std::int64_t more)
+{
+    std::int64_t sum = 0;
+    if (__builtin_add_overflow(units, more, &sum)) outgrown();
+    return sum;
 }
 
 DissipatedUnits over_ranks(const Team& team, DissipatedUnits mine)

@@ -17,6 +17,10 @@ struct StateEnergy {
     double kinetic = 0, potential = 0, elastic = 0;
 };
 
+/// Exact; throws NumbersFailed where an energy is beyond what its unit can count.
+std::int64_t sum_of_units(std::int64_t units, double more);
+std::int64_t sum_of_units(std::int64_t units, std::int64_t more);
+
 /// What left the mechanical ledger since the start, in whole units. Exact; addition in any order.
 struct DissipatedUnits {
     std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0, stabilising = 0;
@@ -24,11 +28,11 @@ struct DissipatedUnits {
                                         &DissipatedUnits::damping, &DissipatedUnits::stabilising};
     void add(const DissipatedUnits& o)
     {
-        for_each_member(*this, o, [](std::int64_t& units, std::int64_t more) { units += more; });
+        for_each_member(*this, o, [](std::int64_t& units, std::int64_t more) { units = sum_of_units(units, more); });
     }
     void add(const EnergySums& e, double unit)
     {
-        for_each_member(*this, e, [unit](std::int64_t& units, double joules) { units += std::int64_t(joules / unit); });
+        for_each_member(*this, e, [unit](std::int64_t& units, double joules) { units = sum_of_units(units, joules / unit); });
     }
 };
 

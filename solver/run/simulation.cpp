@@ -74,11 +74,12 @@ Simulation::~Simulation() = default;
 void Simulation::prepare()
 {
     water_ = PoreWater::from(scene_.effects);
-    for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
+    for (const auto& m : soils_) evolving_ = evolving_ || m.evolves(), remembering_ = remembering_ || m.remembers > 0;
     particles_.require(field::position, field::velocity, field::density, field::stress, field::plastic_strain, field::sorted_position,
                        field::origin, field::id, field::soil);
     model_->require_fields(particles_,
                            std::ranges::any_of(scene_.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; }));
+    if (remembering_) particles_.require(field::opened_volume);
     if (scene_.accuracy.sleep_below > 0) {
         particles_.require(field::activity);
         sleep_interval_ = scene::sleep_interval(scene_);
@@ -99,8 +100,13 @@ Requests Simulation::step(Requests mine)
     timers_.timed(Phase::Move, [&] { model_->move(in); });
     const bool rebuilt = layout_.outgrown(clock_.extremes.displacement2);
     const double way = model_->moves_first() ? dt * std::sqrt(clock_.extremes.drift2) : 0;
+    if (model_->moves_first()) clock_.frame_way = clock_.frame_way + dt * frame(clock_.time + 0.5 * dt);
     if (rebuilt) rebuild(true, way);
-    layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.speed2));
+    // The displacement that this step tells is that of the next one, or its own.
+    const double after = model_->moves_first() ? in.next : dt, from = model_->moves_first() ? clock_.time + dt : clock_.time;
+    in.frame = frame(from + 0.5 * after), in.frame_way = clock_.frame_way + after * in.frame;
+    if (!model_->moves_first()) clock_.frame_way = in.frame_way;
+    layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.drift2));
     const PassResult result = run_stages(in);
     mine = end_step(in, result, mine);
     watch_.judge_step(particles_, clock_);
@@ -144,7 +150,7 @@ void Simulation::rebuild(bool sort_anew, double way)
             layout_.sort_at_present_positions(particles_);
         });
     layout_.rebuild(comm_, domain_, particles_, soils_, *model_, timers_, way);
-    if (sort_anew) clock_.extremes.displacement2 = 0;
+    if (sort_anew) clock_.extremes.displacement2 = 0, clock_.frame_way = {};
     ++rebuilds_;
 }
 
@@ -179,19 +185,23 @@ PassResult Simulation::run_stage(int stage, const StepInput& in)
     return result;
 }
 
-Requests Simulation::end_step(const StepInput& in, const PassResult& result, Requests mine)
+Requests Simulation::end_step(const StepInput& in, PassResult result, Requests mine)
 {
     work_.pairs += result.pairs, work_.asleep += result.asleep;
     work_.halo_bytes += halo_bytes(), work_.messages += halo_messages();
     if (work_.first_step.soil == 0) work_.first_step = {particles_.size(), result.pairs, ghosts(), halo_bytes(), halo_messages()};
     work_.particle_steps += particles_.size();
     const double following = following_dt(in.dt);
-    clock_.dissipated.add(result.energy, clock_.energy_unit);
-    clock_.dissipated.add(std::exchange(clock_.later, {}));
-    clock_.later.add(result.later, clock_.energy_unit);
+    try {
+        clock_.dissipated.add(result.energy, clock_.energy_unit);
+        clock_.dissipated.add(std::exchange(clock_.later, {}));
+        clock_.later.add(result.later, clock_.energy_unit);
+    } catch (const NumbersFailed&) {
+        result.maxima.not_finite = 1; // for all ranks to judge together
+    }
     clock_.time = time_after(scene_, clock_, in.dt);
     clock_.step += 1, work_.steps += 1;
-    clock_.dt = in.dt, clock_.next = following;
+    clock_.dt = in.dt, clock_.next = following, clock_.frame = frame(clock_.time);
     mine = reduce(result, mine);
     if (!model_->moves_first()) layout_.moved(in.dt * std::sqrt(clock_.extremes.drift2));
     return mine;
@@ -217,6 +227,20 @@ Requests Simulation::reduce(const PassResult& result, Requests mine)
     return mine;
 }
 
+Vector Simulation::frame(double time) const
+{
+    if (!scene_.walls.empty()) return {};
+    Vector momentum{};
+    double mass = 0;
+    for (std::size_t k = 0; k < scene_.bodies.size(); ++k) {
+        const double m = soils_[scene_.bodies[k].soil].density * double(filling_.body_count(int(k)));
+        momentum = momentum + m * scene_.bodies[k].velocity, mass += m;
+    }
+    Vector v = (1 / mass) * momentum + time * scene_.effects.gravity.value_or(Vector{});
+    if (scene_.dimensions == 2) v.y = 0;
+    return v;
+}
+
 StepInput Simulation::step_input(double dt, double next)
 {
     StepInput in{.particles = &particles_,
@@ -227,6 +251,7 @@ StepInput Simulation::step_input(double dt, double next)
                  .next = next > 0 ? next : dt, // a run's last forces work as if it went on
                  .forces = {scene_.effects.gravity.value_or(Vector{}), damping()},
                  .evolving = evolving_,
+                 .remembering = remembering_,
                  .energy_unit = clock_.energy_unit,
                  .low = scene_.space.low,
                  .high = scene_.space.high,

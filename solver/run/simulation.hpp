@@ -88,13 +88,15 @@ private:
     void evaluate_start();
     PassResult run_stages(const StepInput&);
     Requests reduce(const PassResult&, Requests mine);
+    /// How fast the whole scene flies past at a time (s): without walls the mean velocity of its bodies, falling with gravity.
+    Vector frame(double time) const;
     /// 1/s, while the scene asks for it.
     double damping() const;
     SleepStage sleep_stage() const;
     /// A stage over all clusters, those without ghosts while the halo travels.
     PassResult run_stage(int stage, const StepInput&);
     void count_work(Phase, const Stage&, std::int64_t pairs, std::size_t clusters);
-    Requests end_step(const StepInput&, const PassResult&, Requests mine);
+    Requests end_step(const StepInput&, PassResult, Requests mine);
     /// Length of the step after one of this length, where it is decided ahead, s.
     double following_dt(double dt) const;
     void remember_if_good(bool rebuilt);
@@ -112,7 +114,7 @@ private:
     Watch watch_;
     Particles particles_;
     PoreWater water_;
-    bool evolving_ = false;
+    bool evolving_ = false, remembering_ = false;
     std::int64_t sleep_interval_ = 1; // steps between detections, where soil may sleep
     Clock clock_;
     WorkDone work_; // of this rank

@@ -1,6 +1,7 @@
 #include "solver/run/start.hpp"
 #include "solver/run/blocks.hpp"
 #include "solver/run/initial_stress.hpp"
+#include "solver/scene/shape.hpp"
 
 namespace kuzure {
 
@@ -42,14 +43,20 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
 
 double energy_scale(const Scene& scene, const scene::Filling& filling, std::span<const Material> soils)
 {
-    const auto& b = filling.soil_bounds();
-    const double g = length(scene.effects.gravity.value_or(Vector{}));
+    // Soil may fall as far as the whole scene reaches, and where there is no floor for all of the run's time.
+    scene::Box b = filling.soil_bounds();
+    for (const auto& wall : scene.walls) {
+        const scene::Box w = scene::bounds(wall.shape);
+        b.low = {std::min(b.low.x, w.low.x), b.low.y, std::min(b.low.z, w.low.z)};
+        b.high = {std::max(b.high.x, w.high.x), b.high.y, std::max(b.high.z, w.high.z)};
+    }
+    const double g = length(scene.effects.gravity.value_or(Vector{})), fall = 0.5 * g * scene.time.end * scene.time.end;
     double scale = 0;
     for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
         const auto& body = scene.bodies[k];
         const Material& m = soils[body.soil];
         const double mass = m.density * scene.particle_volume() * double(filling.body_count(int(k)));
-        const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing});
+        const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing}) + fall;
         scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.sound_speed * m.sound_speed);
     }
     return scale;

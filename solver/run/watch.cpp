@@ -130,7 +130,7 @@ void Watch::judge_step(const Particles& p, const Clock& clock)
 {
     const Extremes& e = clock.extremes;
     const double h = scene_.smoothing_length();
-    const bool outran = std::sqrt(e.speed2) * clock.dt > h;
+    const bool outran = std::sqrt(e.drift2) * clock.dt > h;
     if (e.not_finite == 0 && e.outside == 0 && !outran && e.density_ratio < limit::density) return;
     // The lowest id among the offenders, so that the message does not depend on the ranks.
     std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
@@ -139,7 +139,7 @@ void Watch::judge_step(const Particles& p, const Clock& clock)
         const Vector x = p[field::position][i];
         const double ratio = p[field::density][i] / soils_[p[field::soil][i]].density;
         bool failed = !finite(x) || !finite(p[field::velocity][i]) || !std::isfinite(trace(p[field::stress][i])) || !std::isfinite(ratio) ||
-                      length(p[field::velocity][i]) * clock.dt > h || ratio >= limit::density || ratio * limit::density <= 1;
+                      length(p[field::velocity][i] - clock.frame) * clock.dt > h || ratio >= limit::density || ratio * limit::density <= 1;
         if (scene_.space.low) {
             const Vector lo = *scene_.space.low, hi = *scene_.space.high;
             const auto out = [&](int axis, double v, double a, double b) { return !scene_.space.periodic[axis] && (v < a || v > b); };
@@ -155,8 +155,45 @@ void Watch::judge_step(const Particles& p, const Clock& clock)
     fail_at(p, clock, lowest, fmt::format("changed its density {} fold (", limit::density) + why + ")", remedy);
 }
 
-void Watch::inspect(const Particles& p, const Layout& layout, const Clock& clock, const Ledger& l)
+void Watch::judge_ledger(const Particles& p, Clock& clock, const Ledger& l)
 {
+    clock.largest_energy = std::max(clock.largest_energy, l.state.kinetic + l.state.elastic + std::max(-l.state.potential, 0.0));
+    const double allowed = limit::given * clock.largest_energy;
+    const auto [why, remedy] = diagnosis(clock);
+    if (-l.dissipated.wall > allowed) {
+        const auto id = fastest(p);
+        fail_at(p, clock, id,
+                fmt::format("is the fastest while fixed walls have given {:.3g} J, {:.2g} of the largest energy (at {}; {})",
+                            -l.dissipated.wall, -l.dissipated.wall / clock.largest_energy, nearest_wall(p, id), why),
+                remedy);
+    }
+    const auto falls = [&](const char* name, double now, double& most) {
+        most = std::max(most, now);
+        if (most - now > allowed)
+            fail_at(p, clock, fastest(p),
+                    fmt::format("is the fastest while {} work of {:.3g} J was given back ({})", name, most - now, why), remedy);
+    };
+    falls("plastic", l.dissipated.plastic, clock.largest_taken.plastic);
+    falls("viscous", l.dissipated.viscous, clock.largest_taken.viscous);
+    falls("damping", l.dissipated.damping, clock.largest_taken.damping);
+}
+
+std::string Watch::nearest_wall(const Particles& p, std::int64_t id) const
+{
+    double nearest = std::numeric_limits<double>::infinity();
+    std::int64_t wall = -1;
+    for (Index i = 0; i < p.size(); ++i) {
+        if (p[field::id][i] != id) continue;
+        for (std::size_t w = 0; w < scene_.walls.size(); ++w)
+            if (const double d = scene::signed_distance(scene_.walls[w].shape, p[field::position][i], scene_.dimensions); d < nearest)
+                nearest = d, wall = std::int64_t(w);
+    }
+    return fmt::format("wall {}", comm_.max(wall));
+}
+
+void Watch::inspect(const Particles& p, const Layout& layout, Clock& clock, const Ledger& l)
+{
+    judge_ledger(p, clock, l);
     // Against a thousandth of weight times height at least, so that the first movement is not judged by itself.
     const double energy_scale = std::exp2(58) * clock.energy_unit;
     const double scale =

@@ -12,6 +12,7 @@ namespace kuzure {
 /// Limits beyond which the numbers cannot be trusted.
 namespace limit {
 inline constexpr double energy_growth = 0.10; // of the largest energy in the ledger
+inline constexpr double given = 1e-3;         // of the largest energy met: what fixed walls may have given, and dissipations lost again
 inline constexpr double neighbours = 3.0;     // times those of the lattice
 inline constexpr double penetration = 1.0;    // spacings that a particle may sink into a wall
 inline constexpr double density = 10.0;       // times or parts of that at the start
@@ -38,7 +39,7 @@ public:
     /// The limits of every step. Throws NumbersFailed on every rank together.
     void judge_step(const Particles&, const Clock&);
     /// Energies and neighbourhoods, after a list rebuild. Collective. Throws NumbersFailed on every rank together.
-    void inspect(const Particles&, const Layout&, const Clock&, const Ledger&);
+    void inspect(const Particles&, const Layout&, Clock&, const Ledger&);
 
     /// Shares of clumped particles, and the deepest in a wall (spacings), as last seen and at their worst.
     struct Seen {
@@ -51,6 +52,10 @@ public:
 private:
     /// Throws NumbersFailed with what happened to this particle, where, and the remedy.
     [[noreturn]] void fail_at(const Particles&, const Clock&, std::int64_t id, const std::string& what, const std::string& remedy);
+    /// Fixed walls give no energy, and dissipations do not fall. Throws NumbersFailed.
+    void judge_ledger(const Particles&, Clock&, const Ledger&);
+    /// "wall 2", the one nearest to a particle.
+    std::string nearest_wall(const Particles&, std::int64_t id) const;
     /// Id of the fastest particle, the lowest of several.
     std::int64_t fastest(const Particles&) const;
     /// Which limit of stability the present step breaks, and what to do: {what, remedy}.

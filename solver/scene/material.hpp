@@ -18,6 +18,7 @@ struct Material {
     double cutoff;      // Pa, 3 p_t; infinite without
     double rod_speed;   // sqrt(E/rho), m/s
     double at_rest;     // sideways_at_rest() of ground so deep that cohesion does not count
+    double remembers;   // 1: volume opened at the apex bears no pressure until it is closed; 0: at once
     // What changes the cone during a run; where it does not, the residual values are the first ones.
     double residual_alpha, residual_k;
     double softening_slip = std::numeric_limits<double>::infinity(); // m
@@ -91,6 +92,7 @@ struct Material {
         m.alpha = slope(soil.cone, soil.friction_angle);
         m.k = strength(soil.cone, soil.friction_angle, soil.cohesion);
         m.alpha_psi = slope(soil.cone, soil.dilation_angle);
+        m.remembers = soil.opened_volume == scene::OpenedVolume::Kept;
         m.apex = m.alpha > 0 ? m.k / m.alpha : std::numeric_limits<double>::infinity();
         m.cutoff = soil.tension_cutoff ? 3 * *soil.tension_cutoff : std::numeric_limits<double>::infinity();
         m.apex = std::min(m.apex, m.cutoff);

@@ -37,6 +37,8 @@ using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
 
 // ---- matter ----
 enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation, Shear };
+/// Whether soil remembers the volume that tension at the apex has opened.
+enum class OpenedVolume { Kept, Forgotten };
 
 /// Loss of strength with plastic shear. The slip is that across a whole shear band, so the dissipated energy does not
 /// depend on the resolution: bands are taken to be one support, 2 h, wide (Bazant & Oh 1983).
@@ -63,6 +65,7 @@ struct Soil {
     double friction_angle = 0; // rad
     double dilation_angle = 0; // rad
     Cone cone = Cone::Compression;
+    OpenedVolume opened_volume = OpenedVolume::Kept;
     std::optional<double> tension_cutoff; // Pa, largest mean tension; at most the apex c cot(phi)
     std::optional<double> dilation_decay; // plastic shear strain at which dilation has died out
     std::optional<Softening> softening;
