@@ -2,6 +2,7 @@
 // A cloud of particles without a scene file: jittered lattice with smooth fields, sorted and with lists, for benchmarks
 // and for tests of the pair pass.
 #include "solver/kernels/step.hpp"
+#include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
 #include <random>
 
@@ -19,13 +20,15 @@ inline Scene dry_sand(double spacing = 0.04, double h = 1.2)
     return s;
 }
 
-/// n^3 particles jittered by +-jitter spacings, with smooth velocities and near-geostatic stress.
+/// n^3 particles jittered by +-jitter spacings, with smooth velocities and near-geostatic stress; beside them all points of
+/// the scene's walls, which may reach into the cloud.
 struct Cloud {
     Scene scene;
     Columns columns;
     Particles particles;
     ColumnSort sorted;
     ClusterLists lists;
+    std::vector<WallPoints> walls;
     std::vector<Material> soils;
 
     Cloud(int n, double jitter, const Scene& s = dry_sand(), unsigned seed = 1) : scene(s)
@@ -58,6 +61,16 @@ struct Cloud {
                     p[field::stress].set(i, sigma), p[field::half_stress].set(i, sigma);
                     p[field::id].set(i, std::int64_t(i));
                 }
+        for (int w = 0; w < int(s.walls.size()); ++w) {
+            const scene::Lattice lattice(s.walls[std::size_t(w)].shape, dx, s.dimensions);
+            auto& points = walls.emplace_back();
+            points.wall = w;
+            for (std::int64_t k = 0; k < lattice.size(); ++k) {
+                const Vector x = lattice.position(k);
+                points.x.push_back(x.x), points.y.push_back(x.y), points.z.push_back(x.z), points.id.push_back(k);
+            }
+            points.sort(columns);
+        }
     }
 
     void sort()
@@ -74,7 +87,7 @@ struct Cloud {
                                  &sorted,     particles.size()};
         static const ColumnSort none{.start = {0}};
         const SortedPoints ghosts{.columns = &none};
-        lists.build(columns, owned, ghosts, {}, scene.support() * (1 + skin), width);
+        lists.build(columns, owned, ghosts, walls, scene.support() * (1 + skin), width);
     }
 
     template <class T> void make_records(Array<Record<T>>& records) const
@@ -97,6 +110,19 @@ struct Cloud {
         else r.x = r.y = r.z = 1 << 30;
         r.density = T(1000);
         for (Index i = particles.size(); i < Index(records.size()); ++i) records[i] = r;
+    }
+    /// The walls' points as the pair loop reads them; good as long as the cloud stays where it is.
+    template <class T> std::vector<WallRecords<T>> wall_records() const
+    {
+        const Places<T> place(scene.smoothing_length());
+        std::vector<WallRecords<T>> all;
+        for (const auto& w : walls) {
+            auto& r = all.emplace_back();
+            r.wall = &scene.walls[std::size_t(w.wall)];
+            for (std::size_t k = 0; k < w.x.size(); ++k)
+                r.x.push_back(place(w.x[k])), r.y.push_back(place(w.y[k])), r.z.push_back(place(w.z[k]));
+        }
+        return all;
     }
     template <class T> Pass<T> pass(const Array<Record<T>>& records, Array<Record<T>>& next, double dt)
     {
