@@ -4,6 +4,7 @@
 #include "solver/physics/by_the_book.hpp"
 #include "tests/unit/run_pass.hpp"
 #include <gtest/gtest.h>
+#include <numbers>
 
 using namespace kuzure;
 using bench::Cloud;
@@ -51,7 +52,7 @@ std::vector<Scene> scenes()
     (std::make_integer_sequence<int, KUZURE_VARIANTS>{});
     return all;
 }
-/// The scene with everything, in Wendland C2.
+/// A scene with every term, in Wendland C2, and pore water whose table bends over the cloud.
 Scene everything(int dimensions)
 {
     Scene s = scene_of<KUZURE_VARIANTS - 2>(dimensions);
@@ -262,4 +263,150 @@ TEST(ByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
     EXPECT_GT(slip, 50);
     EXPECT_GT(between, 50);
     EXPECT_GT(off, 50);
+}
+
+TEST(ByTheBook, PoreWaterAndNoGravity)
+{
+    for (const int dimensions : {2, 3}) {
+        Scene s = everything(dimensions);
+        expect_by_the_book(cloud(Jitter, s), by_the_book(cloud(Jitter, s)), "pore water");
+        s.walls = corner(dimensions);
+        expect_by_the_book(cloud(Soils, s), by_the_book(cloud(Soils, s)), "pore water, corner, two soils");
+        s.effects.gravity.reset();
+        expect_by_the_book(cloud(Disorder, s), by_the_book(cloud(Disorder, s)), "no gravity, corner");
+    }
+}
+
+// The kernels of the book themselves: their integral over space is one, and the slope is the value's.
+TEST(ByTheBook, KernelsAreNormalizedAndTheirSlopesAreTheirDerivatives)
+{
+    for (const auto kind : {scene::Kernel::CubicSpline, scene::Kernel::WendlandC2, scene::Kernel::WendlandC4})
+        for (const int dimensions : {2, 3}) {
+            const book::Kernel kernel{kind, dimensions, 0.3};
+            const int n = 2000;
+            const double step = 0.6 / n, pi = std::numbers::pi, scale = std::pow(0.3, -dimensions);
+            double integral = 0;
+            for (int k = 0; k < n; ++k) {
+                const double r = (k + 0.5) * step;
+                integral += kernel.value(r) * (dimensions == 2 ? 2 * pi * r : 4 * pi * r * r) * step;
+                const double derivative = (kernel.value(r + 1e-6) - kernel.value(r - 1e-6)) / 2e-6;
+                ASSERT_NEAR(kernel.slope(r), derivative, 1e-5 * scale / 0.3) << int(kind) << " " << dimensions << " at " << r;
+            }
+            EXPECT_NEAR(integral, 1, 1e-6) << int(kind) << " " << dimensions;
+            EXPECT_EQ(kernel.value(0.6), 0);
+            EXPECT_EQ(kernel.slope(0.6), 0);
+        }
+}
+
+// ---- controls: what a comparison as sharp as this must notice ------------------------------------------------------------
+namespace {
+
+/// Today's law with another range of 1 + d_B/d_A, or another sign.
+book::WallLaw other_mirror(double least, double most, double sign = 1)
+{
+    return [=](const book::Particle& i, const book::WallPoint& j, const scene::Contact& nearest, double volume) {
+        const double both = dot(i.x - j.x, nearest.normal);
+        const double factor = std::clamp(nearest.distance > 0 ? both / nearest.distance : both > 0 ? most : least, least, most);
+        book::Shown shown = book::mirrored(i, j, nearest, volume);
+        shown.soil.v = (1 - sign * factor) * i.v;
+        return shown;
+    };
+}
+/// A law that looks at the wall point: d_A = x_ij . n_j - d_B with the point's own normal and depth.
+book::Shown mirrored_at_each_point(const book::Particle& i, const book::WallPoint& j, const scene::Contact&, double volume)
+{
+    const double above = dot(i.x - j.x, j.normal) - j.depth;
+    const double factor = above > 0 ? std::clamp(1 + j.depth / above, 1.0, 1.5) : 1.5;
+    return {{j.x, (1 - factor) * i.v, i.density, i.stress, volume, i.sound_speed}, j.normal};
+}
+Difference off_from(const Cloud& c, const Read& read)
+{
+    return difference(c, measured::run_pass(c, Arithmetic::Lanes, damping), read.rates);
+}
+
+} // namespace
+
+TEST(ByTheBook, NoticesAPlantedFaultInTheWalls)
+{
+    for (const int dimensions : {2, 3})
+        for (int surface = 0; surface < 3; ++surface) {
+            Scene s = everything(dimensions);
+            s.walls = {wall(2, surface, dimensions)};
+            const Cloud c = cloud(Jitter, s);
+            const std::string what = std::string(surfaces[surface]) + ", " + std::to_string(dimensions) + "-D";
+            const auto expect_noticed = [&](const Read& planted, const char* fault) {
+                EXPECT_GT(off_from(c, planted).largest(), 10 * rough) << what << ": " << fault;
+            };
+            EXPECT_LT(off_from(c, by_the_book(c, other_mirror(1, 1.5))).largest(), sharp) << what; // the control of the controls
+            expect_noticed(by_the_book(c, other_mirror(1, 2)), "cap of 1 + d_B/d_A");
+            expect_noticed(by_the_book(c, other_mirror(0, 1.5)), "least 1 + d_B/d_A");
+            expect_noticed(by_the_book(c, other_mirror(1, 1.5, -1)), "sign of the mirrored velocity");
+            expect_noticed(by_the_book(c, mirrored_at_each_point), "another wall law");
+            for (int other = 0; other < 3; ++other) {
+                Scene mistaken = s;
+                mistaken.walls = {wall(2, other, dimensions)};
+                if (other != surface) expect_noticed(by_the_book(c, book::mirrored, &mistaken), surfaces[other]);
+            }
+            if (surface == 2) {
+                Scene mistaken = s;
+                mistaken.walls[0].friction_angle *= 1.01;
+                expect_noticed(by_the_book(c, book::mirrored, &mistaken), "friction angle");
+            }
+        }
+}
+
+TEST(ByTheBook, NoticesAPlantedFaultInEveryTerm)
+{
+    for (const int dimensions : {2, 3}) {
+        const Scene s = everything(dimensions);
+        const Cloud c = cloud(Hard, s);
+        const auto planted = [&](const char* fault, auto change) {
+            Scene mistaken = s;
+            change(mistaken);
+            const auto off = off_from(c, by_the_book(c, book::mirrored, &mistaken));
+            EXPECT_GT(std::max(off.largest(), off.diffusion), 10 * rough) << fault << ", " << dimensions << "-D";
+        };
+        planted("kernel", [](Scene& m) { m.accuracy.kernel = scene::Kernel::WendlandC4; });
+        planted("alpha", [](Scene& m) { m.effects.viscosity->alpha *= 1.05; });
+        planted("beta", [](Scene& m) { m.effects.viscosity->beta *= -1; });
+        planted("artificial stress", [](Scene& m) { m.effects.artificial_stress->epsilon *= -1; });
+        planted("its exponent", [](Scene& m) { m.effects.artificial_stress->exponent = 2; });
+        planted("stress diffusion", [](Scene& m) { m.effects.stress_diffusion->zeta *= 1.01; });
+        planted("gradient correction", [](Scene& m) { m.accuracy.correction = scene::Correction::None; });
+        planted("gravity", [](Scene& m) { m.effects.gravity->z *= 1.01; });
+        planted("water table", [](Scene& m) { m.effects.pore_pressure->table[1][1] += 0.01; });
+    }
+}
+
+// Each of the nine components of L, and its transpose, is seen.
+TEST(ByTheBook, NoticesAFaultInAnyComponentOfL)
+{
+    Scene s = everything(3);
+    s.walls = {wall(3, 2, 3)};
+    const Cloud c = cloud(Jitter, s);
+    const auto pass = measured::run_pass(c, Arithmetic::Lanes, damping);
+    const Read read = by_the_book(c);
+    EXPECT_LT(difference(c, pass, read.rates).L, sharp);
+    for (int component = 0; component < 10; ++component) {
+        auto planted = read.rates;
+        for (auto& b : planted) {
+            Mat3<double>& L = b.L;
+            double* of[] = {&L.x.x, &L.x.y, &L.x.z, &L.y.x, &L.y.y, &L.y.z, &L.z.x, &L.z.y, &L.z.z};
+            if (component < 9) *of[component] *= -1;
+            else std::swap(L.x.y, L.y.x), std::swap(L.x.z, L.z.x), std::swap(L.y.z, L.z.y);
+        }
+        EXPECT_GT(difference(c, pass, planted).L, 0.01) << component;
+    }
+}
+
+// A wall law is one function: beside a plane the law that looks at each wall point says what today's says, beside a bent wall not.
+TEST(ByTheBook, AWallLawIsOneFunctionExchanged)
+{
+    const double e = edge(3);
+    for (int surface = 0; surface < 3; ++surface) {
+        Scene s = everything(3);
+        s.walls = {{scene::Box{{-6 * dx, -6 * dx, -6 * dx}, {e + 6 * dx, e + 6 * dx, 0}}, scene::Surface(surface), 0.3}};
+        const Cloud plane = cloud(Jitter, s);
+        EXPECT_LT(off_from(plane, by_the_book(plane, mirrored_at_each_point)).largest(), sharp) << surfaces[surface];
+    }
 }
