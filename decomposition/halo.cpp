@@ -11,11 +11,11 @@ using mpi::check;
 struct Halo::Impl {
     const Comm& comm;
     HaloPlan plan;
-    mpi::Type row;
+    std::vector<mpi::Type> row; // of each channel
     Array<std::byte> outgoing, arrivals;
     Index n_ghosts = 0;
-    // One request per peer over MPI: first the receives, then the sends. Own images have none.
-    std::vector<MPI_Request> requests;
+    // Of each channel, one request per peer over MPI: first the receives, then the sends. Own images have none.
+    std::vector<std::vector<MPI_Request>> channels;
     int n_receives = 0;
     std::vector<int> in_of_receive; // receive request -> place in in_
     std::vector<int> send_of_out;   // place in out_ -> send request, or -1
@@ -28,8 +28,9 @@ struct Halo::Impl {
     Impl(const Comm& c, HaloPlan p) : comm(c), plan(std::move(p)) {}
     ~Impl()
     {
-        for (auto& r : requests)
-            if (r != MPI_REQUEST_NULL) MPI_Request_free(&r);
+        for (auto& requests : channels)
+            for (auto& r : requests)
+                if (r != MPI_REQUEST_NULL) MPI_Request_free(&r);
     }
     void note(int n)
     {
@@ -49,11 +50,10 @@ Halo& Halo::operator=(Halo&& other) noexcept
     // to it.
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
     impl_ = std::move(other.impl_);
-    out_ = std::move(other.out_);
-    in_ = std::move(other.in_);
+    channels_ = std::move(other.channels_);
+    current_ = other.current_;
     slot_ = std::move(other.slot_);
-    row_bytes_ = other.row_bytes_;
-    bytes_ = other.bytes_;
+    rows_ = other.rows_;
     refreshes_ = other.refreshes_;
     messages_ = other.messages_;
     return *this;
@@ -64,62 +64,67 @@ Halo::~Halo()
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
 }
 
-Halo::Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes)
-    : impl_(std::make_unique<Impl>(comm, std::move(plan))), row_bytes_(row_bytes)
+Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_bytes) : impl_(std::make_unique<Impl>(comm, std::move(plan)))
 {
-    ensure(row_bytes > 0, "a halo's rows have at least one byte");
+    ensure(!row_bytes.empty() && std::ranges::min(row_bytes) > 0, "a halo's rows have at least one byte");
     Impl& m = *impl_;
-    m.row = mpi::item_of(row_bytes);
+    const std::size_t longest = std::ranges::max(row_bytes);
     const MPI_Comm mpi_comm = *static_cast<const MPI_Comm*>(comm.native());
 
     std::vector<Parcel<std::int64_t>> counts;
-    std::int64_t n_out = 0, n_in = 0;
+    std::int64_t n_in = 0;
     for (const auto& p : m.plan.peers) {
         const auto n = std::int64_t(p.sends.size());
         if (n == 0) continue;
         counts.push_back({p.rank, {n}});
-        if (p.rank != comm.rank()) n_out += n;
+        if (p.rank != comm.rank()) rows_ += n, ++messages_;
     }
     counts = comm.exchange(counts);
     for (const auto& c : counts) n_in += c.items.at(0);
-    ensure(n_in <= std::numeric_limits<Index>::max() && n_out <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
+    ensure(n_in <= std::numeric_limits<Index>::max() && rows_ <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
     m.n_ghosts = Index(n_in);
-    m.outgoing.resize(std::size_t(n_out) * row_bytes);
-    m.arrivals.resize(std::size_t(n_in) * row_bytes);
-
-    Index first = 0;
+    m.outgoing.resize(std::size_t(rows_) * longest);
+    m.arrivals.resize(std::size_t(n_in) * longest);
     for (const auto& c : counts) {
-        const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * row_bytes};
-        if (c.rank == comm.rank()) {
-            m.self = int(in_.size());
-        } else {
-            m.in_of_receive.push_back(int(in_.size()));
-            m.requests.push_back(MPI_REQUEST_NULL);
-            check(MPI_Recv_init(in.rows, in.n, m.row.type, c.rank, mpi::Refresh, mpi_comm, &m.requests.back()), "MPI_Recv_init");
-        }
-        in_.push_back(in);
-        first += in.n;
+        if (c.rank == comm.rank()) m.self = int(&c - counts.data());
+        else m.in_of_receive.push_back(int(&c - counts.data()));
     }
-    m.n_receives = int(m.requests.size());
+    m.n_receives = int(m.in_of_receive.size());
+    int n_requests = m.n_receives;
+    for (const auto& p : m.plan.peers)
+        if (!p.sends.empty()) m.send_of_out.push_back(p.rank == comm.rank() ? -1 : n_requests++);
 
-    std::byte* rows = m.outgoing.data();
-    for (const auto& p : m.plan.peers) {
-        if (p.sends.empty()) continue;
-        Out out{p.sends.data(), Index(p.sends.size()), rows};
-        if (p.rank == comm.rank()) {
-            out.rows = in_[m.self].rows;
-            m.send_of_out.push_back(-1);
-        } else {
-            rows += std::size_t(out.n) * row_bytes;
-            m.send_of_out.push_back(int(m.requests.size()));
-            m.requests.push_back(MPI_REQUEST_NULL);
-            check(MPI_Send_init(out.rows, out.n, m.row.type, p.rank, mpi::Refresh, mpi_comm, &m.requests.back()), "MPI_Send_init");
-            bytes_ += std::int64_t(out.n) * std::int64_t(row_bytes);
-            ++messages_;
+    for (const std::size_t bytes : row_bytes) {
+        if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.row_bytes == bytes; })) continue;
+        Channel channel{bytes, {}, {}};
+        m.row.push_back(mpi::item_of(bytes));
+        auto& requests = m.channels.emplace_back();
+        Index first = 0;
+        for (const auto& c : counts) {
+            const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * bytes};
+            if (c.rank != comm.rank()) {
+                requests.push_back(MPI_REQUEST_NULL);
+                check(MPI_Recv_init(in.rows, in.n, m.row.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
+            }
+            channel.in.push_back(in);
+            first += in.n;
         }
-        out_.push_back(out);
+        std::byte* rows = m.outgoing.data();
+        for (const auto& p : m.plan.peers) {
+            if (p.sends.empty()) continue;
+            Out out{p.sends.data(), Index(p.sends.size()), rows};
+            if (p.rank == comm.rank()) {
+                out.rows = channel.in[m.self].rows;
+            } else {
+                rows += std::size_t(out.n) * bytes;
+                requests.push_back(MPI_REQUEST_NULL);
+                check(MPI_Send_init(out.rows, out.n, m.row.back().type, p.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Send_init");
+            }
+            channel.out.push_back(out);
+        }
+        channels_.push_back(std::move(channel));
     }
-    m.finished.resize(m.requests.size());
+    m.finished.resize(std::size_t(n_requests));
     slot_.resize(m.n_ghosts);
     std::iota(slot_.begin(), slot_.end(), 0);
 }
@@ -148,30 +153,34 @@ void Halo::place(std::span<const Index> slot)
     slot_.assign(slot.begin(), slot.end());
 }
 
-void Halo::start_receives()
+void Halo::start_receives(std::size_t row_bytes)
 {
     Impl& m = *impl_;
     ensure(!m.in_flight, "a refresh begins while another is under way");
+    const auto channel = std::ranges::find(channels_, row_bytes, &Channel::row_bytes);
+    ensure(channel != channels_.end(), "a refresh has rows of a size that its halo was not made for");
+    current_ = std::size_t(channel - channels_.begin());
     m.in_flight = true;
     m.outstanding = m.n_receives;
     m.ready.clear();
     if (m.self >= 0) m.ready.push_back(m.self);
-    if (m.n_receives) check(MPI_Startall(m.n_receives, m.requests.data()), "MPI_Startall");
+    if (m.n_receives) check(MPI_Startall(m.n_receives, m.channels[current_].data()), "MPI_Startall");
 }
 
 void Halo::start_send(int peer)
 {
     Impl& m = *impl_;
     const int k = m.send_of_out[peer];
-    if (k >= 0) check(MPI_Start(&m.requests[k]), "MPI_Start");
+    if (k >= 0) check(MPI_Start(&m.channels[current_][k]), "MPI_Start");
 }
 
 void Halo::progress()
 {
     Impl& m = *impl_;
-    if (!m.in_flight || m.requests.empty()) return;
+    auto& requests = m.channels[current_];
+    if (!m.in_flight || requests.empty()) return;
     int n = 0;
-    check(MPI_Testsome(int(m.requests.size()), m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Testsome");
+    check(MPI_Testsome(int(requests.size()), requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Testsome");
     if (n != MPI_UNDEFINED) m.note(n);
 }
 
@@ -181,7 +190,7 @@ int Halo::next_arrival()
     ensure(m.in_flight, "a refresh ends that was not begun");
     while (m.ready.empty() && m.outstanding > 0) {
         int n = 0;
-        check(MPI_Waitsome(m.n_receives, m.requests.data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Waitsome");
+        check(MPI_Waitsome(m.n_receives, m.channels[current_].data(), &n, m.finished.data(), MPI_STATUSES_IGNORE), "MPI_Waitsome");
         ensure(n != MPI_UNDEFINED, "a halo waits for messages that are not under way");
         m.note(n);
     }
@@ -194,8 +203,9 @@ int Halo::next_arrival()
 void Halo::finish()
 {
     Impl& m = *impl_;
-    const int sends = int(m.requests.size()) - m.n_receives;
-    check(MPI_Waitall(sends, m.requests.data() + m.n_receives, MPI_STATUSES_IGNORE), "MPI_Waitall");
+    auto& requests = m.channels[current_];
+    const int sends = int(requests.size()) - m.n_receives;
+    check(MPI_Waitall(sends, requests.data() + m.n_receives, MPI_STATUSES_IGNORE), "MPI_Waitall");
     m.in_flight = false;
     ++refreshes_;
 }

@@ -34,8 +34,9 @@ struct Ghost {
 /// only.
 class Halo {
 public:
-    /// Collective. The plan's counts are exchanged; rows have `row_bytes` bytes, packed without gaps.
-    Halo(const Comm&, HaloPlan, std::size_t row_bytes);
+    /// Collective. The plan's counts are exchanged; rows of a refresh have one of these sizes, packed without gaps.
+    Halo(const Comm&, HaloPlan, std::span<const std::size_t> row_bytes);
+    Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes) : Halo(comm, std::move(plan), std::span(&row_bytes, 1)) {}
     Halo(Halo&&) noexcept;
     Halo& operator=(Halo&&) noexcept;
     ~Halo();
@@ -68,20 +69,22 @@ public:
     /// Row k of an arrival goes to slot[k] from now on; the identity before the first call.
     void place(std::span<const Index> slot);
 
-    /// Starts a refresh: copy(Index owned, Vector shift, std::byte* to) writes one row; threads call it at
-    /// once.
-    template <class Copy> void begin(Copy copy)
+    /// Starts a refresh of rows of one of the sizes: copy(Index owned, Vector shift, std::byte* to) writes one row; threads
+    /// call it at once.
+    template <class Copy> void begin(std::size_t row_bytes, Copy copy)
     {
-        start_receives();
+        start_receives(row_bytes);
         for (int peer = 0; peer < n_out(); ++peer) {
-            const Out out = out_[peer];
-            const std::size_t bytes = row_bytes_;
+            const Out out = now().out[peer];
+            const std::size_t bytes = row_bytes;
             const auto& shift = plan().shift;
 #pragma omp parallel for schedule(static) if (out.n > parallel_rows)
             for (Index k = 0; k < out.n; ++k) copy(out.sends[k].owned, shift[out.sends[k].shift], out.rows + std::size_t(k) * bytes);
             start_send(peer);
         }
     }
+    /// The same of the first size.
+    template <class Copy> void begin(Copy copy) { begin(channels_.front().row_bytes, copy); }
     /// Lets MPI move what is under way; call it between chunks of work.
     void progress();
     /// Ends the refresh: waits, and hands over each row by put(Index slot, const std::byte* row); threads
@@ -89,8 +92,8 @@ public:
     template <class Put> void arrive(Put put)
     {
         for (int peer; (peer = next_arrival()) >= 0;) {
-            const In in = in_[peer];
-            const std::size_t bytes = row_bytes_;
+            const In in = now().in[peer];
+            const std::size_t bytes = now().row_bytes;
             const Index* slot = slot_.data() + in.first;
 #pragma omp parallel for schedule(static) if (in.n > parallel_rows)
             for (Index k = 0; k < in.n; ++k) put(slot[k], static_cast<const std::byte*>(in.rows) + std::size_t(k) * bytes);
@@ -98,9 +101,9 @@ public:
         finish();
     }
 
-    std::size_t row_bytes() const { return row_bytes_; }
-    /// This rank's sends over MPI in one refresh.
-    std::int64_t bytes_per_refresh() const { return bytes_; }
+    /// This rank's sends over MPI in one refresh: rows, and bytes of the first size.
+    std::int64_t rows_per_refresh() const { return rows_; }
+    std::int64_t bytes_per_refresh() const { return rows_ * std::int64_t(channels_.front().row_bytes); }
     int messages_per_refresh() const { return messages_; }
     std::int64_t refreshes() const { return refreshes_; }
 
@@ -115,20 +118,26 @@ private:
         Index first, n;
         std::byte* rows;
     };
+    /// Buffers' places for rows of one size.
+    struct Channel {
+        std::size_t row_bytes;
+        std::vector<Out> out;
+        std::vector<In> in;
+    };
     const Comm& comm() const;
-    int n_out() const { return int(out_.size()); }
-    void start_receives();
+    const Channel& now() const { return channels_[current_]; }
+    int n_out() const { return int(channels_.front().out.size()); }
+    void start_receives(std::size_t row_bytes);
     void start_send(int peer);
     int next_arrival();
     void finish();
 
     struct Impl;
     std::unique_ptr<Impl> impl_;
-    std::vector<Out> out_;
-    std::vector<In> in_;
+    std::vector<Channel> channels_;
+    std::size_t current_ = 0; // channel of the refresh under way
     std::vector<Index> slot_;
-    std::size_t row_bytes_ = 0;
-    std::int64_t bytes_ = 0, refreshes_ = 0;
+    std::int64_t rows_ = 0, refreshes_ = 0;
     int messages_ = 0;
 };
 

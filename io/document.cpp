@@ -166,7 +166,10 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     case Kind::ChoiceOrTable:
         return node.is_table() ? std::nullopt : wrong_choice(key, node);
     case Kind::Table:
+    case Kind::Settings:
         return unless(node.is_table());
+    case Kind::TextOrTrue:
+        return unless(node.is_string() || node.value_or(false));
     case Kind::Named:
         return unless(node.is_table() && !node.as_table()->empty());
     case Kind::Texts:
@@ -343,12 +346,6 @@ std::vector<std::string> Document::texts(const std::string& path) const
     return all;
 }
 
-std::size_t Document::choice(const std::string& path) const
-{
-    const auto& choices = keys_.find(path)->choices;
-    return std::size_t(std::find(choices.begin(), choices.end(), text(path)) - choices.begin());
-}
-
 std::vector<std::string> Document::names(const std::string& path) const
 {
     const auto* table = find(path);
@@ -367,9 +364,9 @@ std::vector<std::string> Document::names(const std::string& path) const
 
 // ---- every key against the table of keys ----
 
-void Document::check(const Rule& rule)
+void Document::check()
 {
-    check_table(root, "", rule);
+    check_table(root, "");
     throw_if_any();
 }
 
@@ -401,11 +398,13 @@ const toml::node& fallback(const Key& key)
 } // namespace
 
 /// Checks a table against the rows of its pattern and fills in defaults.
-void Document::check_table(toml::table& table, const std::string& path, const Rule& rule)
+void Document::check_table(toml::table& table, const std::string& path)
 {
     const std::string pattern = keys_.pattern_of(path);
+    const Key* self = path.empty() ? nullptr : keys_.find(path);
     for (const auto& [key, node] : table)
-        if (!keys_.find(join(path, key.str())) || key.str().find('.') != std::string_view::npos)
+        if (self && self->kind == Kind::Settings) break;
+        else if (!keys_.find(join(path, key.str())) || key.str().find('.') != std::string_view::npos)
             complain_unknown(join(path, key.str()), key.str(), pattern);
 
     for (const Key* key : keys_.inside(pattern)) {
@@ -431,17 +430,36 @@ void Document::check_table(toml::table& table, const std::string& path, const Ru
                                    std::string_view::npos;
                 if (!plain || name.str().empty())
                     complain(named, fmt::format("expected a name of letters, digits, - and _, found another; rename the {}", key->leaf()));
-                else if (auto* inside = value.as_table()) check_table(*inside, named, rule);
+                else if (auto* inside = value.as_table()) check_table(*inside, named);
                 else complain(named, fmt::format("expected a {}'s table, found {}; {}", key->leaf(), described(value), remedy));
             }
         } else if (key->kind == Kind::Tables) {
             std::size_t k = 0;
-            for (auto& element : *node.as_array()) check_table(*element.as_table(), join(here, std::to_string(k++)), rule);
+            for (auto& element : *node.as_array()) check_table(*element.as_table(), join(here, std::to_string(k++)));
         } else if (auto* inside = node.as_table()) {
-            check_table(*inside, here, rule);
+            check_table(*inside, here);
         }
     }
-    if (rule) rule(*this, table, path, pattern);
+    check_alternatives(table, path, pattern);
+}
+
+/// Of keys that exclude one another, one is there.
+void Document::check_alternatives(const toml::table& table, const std::string& path, const std::string& pattern)
+{
+    std::vector<std::string_view> known, found;
+    const Key* first = nullptr;
+    for (const Key* key : keys_.inside(pattern)) {
+        if (key->need != Need::OneOf) continue;
+        if (!first) first = key;
+        known.push_back(key->leaf());
+        if (table.contains(key->leaf())) found.push_back(key->leaf());
+    }
+    if (!first || found.size() == 1) return;
+    const std::string remedy = found.empty()             ? fmt::format("write, for example, {} = {}", first->leaf(), first->example)
+                               : pattern.ends_with(".*") ? fmt::format("give each its own [[{}]]", pattern.substr(0, pattern.size() - 2))
+                                                         : "leave one";
+    complain(path, fmt::format("expected exactly one of {}, found {}; {}", fmt::join(known, ", "),
+                               found.empty() ? "none" : fmt::format("{}", fmt::join(found, " and ")), remedy));
 }
 
 std::string read_document_text(const std::filesystem::path& path, std::string_view what)

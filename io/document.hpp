@@ -2,8 +2,9 @@
 // A TOML file checked by a table of keys: the place of every key for messages, --set, unknown and misspelt keys, defaults.
 // For files of io/ alone: it brings toml++.
 #include "io/keys.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,10 +33,8 @@ public:
 
     toml::table root;
 
-    /// What the rows of a table cannot say: called for every table with its path and pattern.
-    using Rule = std::function<void(Document&, const toml::table&, const std::string& path, const std::string& pattern)>;
     /// Checks everything against the keys and fills in defaults. Throws BadInput with up to 20 lines.
-    void check(const Rule& = {});
+    void check();
 
     /// "scene.toml:12", or "--set time.step=1".
     std::string place(const std::string& path) const { return place_and_line(path).first; }
@@ -52,8 +51,13 @@ public:
     int integer(const std::string& path) const { return int(at(path).as_integer()->get()); }
     const std::string& text(const std::string& path) const { return at(path).as_string()->get(); }
     std::vector<std::string> texts(const std::string& path) const;
-    /// Position of a Choice's value among its choices.
-    std::size_t choice(const std::string& path) const;
+    /// The value whose word stands at a Choice that has these words.
+    template <class Enum> Enum choice(const std::string& path, const Words<Enum>& words) const
+    {
+        const auto found = std::find_if(words.begin(), words.end(), [&](const auto& w) { return w.word == text(path); });
+        ensure(found != words.end(), "a choice is read that was not checked");
+        return found->value;
+    }
     /// Names of the tables inside, in the order of the file; none where the key is not there.
     std::vector<std::string> names(const std::string& path) const;
 
@@ -67,7 +71,8 @@ private:
     std::pair<std::string, std::size_t> place_and_line(const std::string& path) const;
     void override_with(const std::string& set);
     void complain_unknown(const std::string& path, std::string_view leaf, std::string_view pattern);
-    void check_table(toml::table&, const std::string& path, const Rule&);
+    void check_table(toml::table&, const std::string& path);
+    void check_alternatives(const toml::table&, const std::string& path, const std::string& pattern);
 
     std::string name_;
     const KeyTable& keys_;

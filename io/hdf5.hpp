@@ -12,10 +12,10 @@ std::string hdf5_library();
 
 /// Number types a table may hold.
 enum class Number { Float64, Int64, Int32, UInt8 };
-template <class T> inline constexpr Number number_of = Number::Float64;
-template <> inline constexpr Number number_of<std::int64_t> = Number::Int64;
-template <> inline constexpr Number number_of<std::int32_t> = Number::Int32;
-template <> inline constexpr Number number_of<std::uint8_t> = Number::UInt8;
+template <class T> inline constexpr Number stored_as = Number::Float64;
+template <> inline constexpr Number stored_as<std::int64_t> = Number::Int64;
+template <> inline constexpr Number stored_as<std::int32_t> = Number::Int32;
+template <> inline constexpr Number stored_as<std::uint8_t> = Number::UInt8;
 std::size_t bytes_of(Number);
 
 /// A new HDF5 file, written by all ranks of a team together. Rank 0 lays out the file by the HDF5 library;
@@ -42,7 +42,7 @@ public:
     /// A table of this rank's rows after those of lower ranks; one component gives a one-dimensional table.
     template <class T> void table(const std::string& name, std::span<const T> mine, int components)
     {
-        write(name, number_of<T>, mine.data(), mine.size() / std::size_t(components), components);
+        write(name, stored_as<T>, mine.data(), mine.size() / std::size_t(components), components);
     }
     /// Close and bring to the disk. The file is then whole and still named `temporary()`.
     void finish();
@@ -86,9 +86,9 @@ public:
     template <class T>
     void rows(const std::string& name, std::uint64_t first, std::uint64_t count, int components, std::vector<T>& into) const
     {
-        check_rows(name, number_of<T>, first, count, components);
+        check_rows(name, stored_as<T>, first, count, components);
         into.resize(std::size_t(count) * std::size_t(components));
-        read(name, number_of<T>, first, count, components, into.data());
+        read(name, stored_as<T>, first, count, components, into.data());
     }
     double real(const std::string& object, const std::string& attribute) const;
     std::int64_t integer(const std::string& object, const std::string& attribute) const;

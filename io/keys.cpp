@@ -49,6 +49,10 @@ std::string Key::expected() const
         return fmt::format("tables [{}.<name>]", path);
     case Kind::Texts:
         return "an array of strings";
+    case Kind::TextOrTrue:
+        return "a string or true";
+    case Kind::Settings:
+        return "a table";
     }
     return {};
 }
@@ -110,9 +114,9 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
 {
     // What others call it is nearer than any word of similar letters.
     static constexpr std::pair<std::string_view, std::string_view> others[] = {
-        {"rho", "density"},        {"E", "young"},    {"nu", "poisson"},    {"c", "cohesion"},   {"phi", "friction_angle"},
-        {"psi", "dilation_angle"}, {"dx", "spacing"}, {"dp", "spacing"},    {"dt", "step"},      {"g", "gravity"},
-        {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}};
+        {"rho", "density"},        {"E", "young"},    {"nu", "poisson"},    {"c", "cohesion"},    {"phi", "friction_angle"},
+        {"psi", "dilation_angle"}, {"dx", "spacing"}, {"dp", "spacing"},    {"dt", "step"},       {"g", "gravity"},
+        {"diameter", "radius"},    {"size", "high"},  {"boundary", "wall"}, {"material", "soil"}, {"cuboid", "box"}};
     for (const auto& [other, ours] : others)
         if (written == other && std::find(known.begin(), known.end(), ours) != known.end()) return std::string(ours);
     // A very long word is near to nothing, and its distances would take long.

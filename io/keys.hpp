@@ -1,6 +1,6 @@
 #pragma once
-// Keys of a TOML file as rows of a table: what a value must be, its unit, range and default, and what it is for. Scene files
-// and machine profiles each have such a table; io/document.hpp checks files by it.
+// Keys of a TOML file as rows of a table: what a value must be, its unit, range and default, and what it is for. Scene files,
+// machine profiles and sweeps each have such a table; io/document.hpp checks files by it.
 #include <limits>
 #include <string>
 #include <string_view>
@@ -23,7 +23,9 @@ enum class Kind {
     Table,         // a table of keys
     Tables,        // [[...]], any number of tables
     Named,         // [....name], any number of tables with names
-    Texts          // an array of strings
+    Texts,         // an array of strings
+    TextOrTrue,    // a string, or true
+    Settings       // a table, or one of several, in which any key may stand beside those that have rows
 };
 
 /// Interval of allowed numbers; open ends are excluded.
@@ -34,8 +36,18 @@ struct Range {
     /// "0 < x <= 0.5", or empty if every number is allowed.
     std::string text() const;
 };
+constexpr Range above(double low) { return {.low = low, .low_open = true}; }
+constexpr Range from(double low) { return {.low = low}; }
+constexpr Range between(double low, double high) { return {.low = low, .high = high}; }
+constexpr Range from_below(double low, double high) { return {.low = low, .high = high, .high_open = true}; }
+constexpr Range above_to(double low, double high) { return {.low = low, .high = high, .low_open = true}; }
 
-enum class Need { Required, Optional, Default };
+enum class Need {
+    Required,
+    Optional,
+    Default,
+    OneOf // exactly one of the keys of its table that need this
+};
 /// On restart the physics of a run may not change; what else a scene says may.
 enum class Role { Physics, Bookkeeping };
 
@@ -55,6 +67,20 @@ struct Key {
     std::string expected() const;
     std::string_view leaf() const { return std::string_view(path).substr(path.rfind('.') + 1); }
 };
+
+/// A value of an enum and the word that stands for it in a file.
+template <class Enum> struct Word {
+    const char* word;
+    Enum value;
+};
+template <class Enum> using Words = std::vector<Word<Enum>>;
+/// The words alone: a Key's choices.
+template <class Enum> std::vector<std::string> choices_of(const Words<Enum>& words)
+{
+    std::vector<std::string> choices;
+    for (const auto& w : words) choices.emplace_back(w.word);
+    return choices;
+}
 
 /// The keys of one kind of file.
 class KeyTable {

@@ -8,6 +8,9 @@
 namespace kuzure::io {
 namespace {
 
+const Words<Batch> batch_systems{{"none", Batch::None}, {"pjsub", Batch::Pjsub}, {"slurm", Batch::Slurm}};
+const Words<Resubmit> ways_to_resubmit{{"itself", Resubmit::Itself}, {"chain", Resubmit::Chain}};
+
 std::vector<Key> make_keys()
 {
     using enum Kind;
@@ -15,15 +18,8 @@ std::vector<Key> make_keys()
     const Range any{}, positive{.low = 0, .low_open = true}, count{.low = 1, .high = 1e7};
     return {
         {"title", Text, "", Required, "", any, {}, "\"Oakforest-PACS\"", "what machine this is"},
-        {"batch", Choice, "", Required, "", any, {"none", "pjsub", "slurm"}, "\"slurm\"", "its batch system"},
-        {"resubmit",
-         Choice,
-         "",
-         Default,
-         "\"itself\"",
-         any,
-         {"itself", "chain"},
-         "\"chain\"",
+        {"batch", Choice, "", Required, "", any, choices_of(batch_systems), "\"slurm\"", "its batch system"},
+        {"resubmit", Choice, "", Default, "\"itself\"", any, choices_of(ways_to_resubmit), "\"chain\"",
          "a job at its clock limit submits itself again, or jobs are chained beforehand because compute nodes cannot submit"},
         {"needs_account", Flag, "", Default, "false", any, {}, "true", "jobs are refused without a project (--account)"},
 
@@ -102,7 +98,7 @@ MachineProfile parse_machine_profile(std::string_view text, const std::filesyste
 
     MachineProfile m;
     m.name = file.stem().string(), m.file = file, m.title = d.text("title");
-    m.batch = Batch(d.choice("batch")), m.resubmit = Resubmit(d.choice("resubmit"));
+    m.batch = d.choice("batch", batch_systems), m.resubmit = d.choice("resubmit", ways_to_resubmit);
     m.needs_account = d.at("needs_account").as_boolean()->get();
     m.node = {d.integer("node.count"), int(number_or_0("node.cores")), d.integer("node.threads_per_core"), d.integer("node.ranks"),
               number_or_0("node.memory")};

@@ -1,5 +1,5 @@
 #pragma once
-// The scene file: TOML to a scene and back. What a scene may say stands in io/scene_keys.cpp alone.
+// The scene file: TOML to a scene and back. What a scene may say stands in io/scene_description.hpp alone.
 #include "solver/scene/check.hpp"
 #include "solver/scene/scene.hpp"
 #include <filesystem>
@@ -35,5 +35,9 @@ std::string physics_difference(const Scene& was, const Scene& is);
 
 /// Every key with type, unit, default, range and meaning, as Markdown.
 std::string scene_reference();
+
+/// A JSON Schema (draft 2020-12) of scene files, by which editors complete and check them. It knows each key's type, range and
+/// default; what ties several keys together only the reader checks.
+std::string scene_schema();
 
 } // namespace kuzure::io

@@ -1,26 +1,19 @@
 #include "io/scene_keys.hpp"
+#include "io/scene_description.hpp"
+#include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 
 namespace kuzure::io {
 namespace {
 
-Range above(double low) { return {.low = low, .low_open = true}; }
-Range from(double low) { return {.low = low}; }
-Range between(double low, double high) { return {.low = low, .high = high}; }
-Range from_below(double low, double high) { return {.low = low, .high = high, .high_open = true}; }
-Range above_to(double low, double high) { return {.low = low, .high = high, .low_open = true}; }
-const Range any{};
-/// Places and sizes: beyond this nobody means metres.
-const double far = 1e9;
-
-/// In the order of scene::Preset.
 std::vector<Preset> make_presets()
 {
-    const auto preset = [](const char* name, const char* doc, const char* kernel, const char* h, const char* cfl, const char* precision,
-                           const char* correction) {
+    const auto preset = [](scene::Preset value, const char* name, const char* doc, const char* kernel, const char* h, const char* cfl,
+                           const char* precision, const char* correction) {
         const auto quoted = [](const char* s) { return fmt::format("\"{}\"", s); };
-        return Preset{name,
+        return Preset{value,
+                      name,
                       doc,
                       {{"space.h", h},
                        {"accuracy.kernel", quoted(kernel)},
@@ -29,430 +22,117 @@ std::vector<Preset> make_presets()
                        {"accuracy.correction", quoted(correction)},
                        {"accuracy.skin", "0.1"}}};
     };
-    return {
-        preset("seed", "as the paper: its step of 1e-4 s is a Courant number of 0.075", "cubic spline", "1.2", "0.075", "double", "none"),
-        preset("fast", "least time for a first look", "cubic spline", "1.2", "0.3", "mixed", "none"),
-        preset("standard", "least error for its time", "wendland c2", "1.3", "0.2", "double", "none"),
-        preset("accurate", "least error at a spacing", "wendland c2", "1.5", "0.2", "double", "none")};
+    using enum scene::Preset;
+    return {preset(Seed, "seed", "as the paper: its step of 1e-4 s is a Courant number of 0.075", "cubic spline", "1.2", "0.075", "double",
+                   "none"),
+            preset(Fast, "fast", "least time for a first look", "cubic spline", "1.2", "0.3", "mixed", "none"),
+            preset(Standard, "standard", "least error for its time", "wendland c2", "1.3", "0.2", "double", "none"),
+            preset(Accurate, "accurate", "least error at a spacing", "wendland c2", "1.5", "0.2", "double", "none")};
 }
-std::vector<std::string> preset_names()
-{
-    std::vector<std::string> names;
-    for (const auto& p : presets()) names.push_back(p.name);
-    return names;
-}
+
+/// Visits describe() and makes a row of every key.
+class Collector {
+public:
+    std::vector<Key> keys;
+
+    void section(const char* path, const KeyInfo& k) { add(path, Kind::Table, k); }
+    void text(const std::string& path, const std::string&, const KeyInfo& k) { add(path, Kind::Text, k); }
+    void integer(const std::string& path, int, const KeyInfo& k) { add(path, Kind::Integer, k); }
+    void flag(const std::string& path, bool, const KeyInfo& k) { add(path, Kind::Flag, k); }
+    void number(const std::string& path, const double&, const KeyInfo& k) { add(path, Kind::Number, k); }
+    void number(const std::string& path, const std::optional<double>&, const KeyInfo& k)
+    {
+        add(path, Kind::Number, k).need = Need::Optional;
+    }
+    void angle(const std::string& path, const double&, const KeyInfo& k) { add(path, Kind::Number, k); }
+    void vector(const std::string& path, const Vector&, const KeyInfo& k) { add(path, Kind::Vector, k); }
+    void vector(const std::string& path, const std::optional<Vector>&, const KeyInfo& k)
+    {
+        add(path, Kind::Vector, k).need = Need::Optional;
+    }
+    void pair(const std::string& path, const std::array<double, 2>&, const KeyInfo& k) { add(path, Kind::Pair, k); }
+    void points(const std::string& path, const std::vector<std::array<double, 2>>&, const KeyInfo& k) { add(path, Kind::Points, k); }
+    void axes(const std::string& path, const std::array<bool, 3>&, const KeyInfo& k)
+    {
+        add(path, Kind::Choices, k).choices = {"x", "y", "z"};
+    }
+    void choices(const std::string& path, const std::vector<std::string>&, std::initializer_list<const char*> words, const KeyInfo& k)
+    {
+        add(path, Kind::Choices, k).choices.assign(words.begin(), words.end());
+    }
+    template <class Enum>
+    void choice(const std::string& path, const Enum&, const std::type_identity_t<Words<Enum>>& words, const KeyInfo& k)
+    {
+        add(path, Kind::Choice, k).choices = choices_of(words);
+    }
+    template <class Enum, class Describe>
+    void choice_or_table(const std::string& path, const Enum&, const std::type_identity_t<Words<Enum>>& words, Enum, const KeyInfo& k,
+                         Describe describe)
+    {
+        add(path, Kind::ChoiceOrTable, k).choices = choices_of(words);
+        describe(path);
+    }
+    template <class T, class Describe> void table(const std::string& path, const std::optional<T>&, const KeyInfo& k, Describe describe)
+    {
+        add(path, Kind::Table, k).need = Need::Optional;
+        T value{};
+        describe(path, value);
+    }
+    template <class T, class Describe>
+    void automatic(const std::string& path, const std::optional<T>& to, scene::Decision, const KeyInfo& k, Describe describe)
+    {
+        const auto row = keys.size();
+        table(path, to, k, describe);
+        keys[row].kind = Kind::ChoiceOrTable, keys[row].choices = {"auto"};
+    }
+    template <class T, class Describe> void tables(const std::string& path, const std::vector<T>&, const KeyInfo& k, Describe describe)
+    {
+        add(path, Kind::Tables, k);
+        T element{};
+        describe(path + ".*", element);
+    }
+    template <class Describe> void soils(const std::string& path, const std::vector<scene::Soil>&, const KeyInfo& k, Describe describe)
+    {
+        add(path, Kind::Named, k);
+        add(path + ".*", Kind::Table, {.optional = true, .example = k.example, .doc = "one soil"});
+        scene::Soil soil{};
+        describe(path + ".*", soil);
+    }
+    void soil_of(const std::string& path, int, const std::vector<scene::Soil>&, const KeyInfo& k) { add(path, Kind::Text, k); }
+    template <class T, class Describe> void alternative(const std::string& path, const scene::Shape&, const KeyInfo& k, Describe describe)
+    {
+        add(path, Kind::Table, k).need = Need::OneOf;
+        T shape{};
+        describe(path, shape);
+    }
+
+private:
+    Key& add(const std::string& path, Kind kind, const KeyInfo& k)
+    {
+        const std::string head = path.substr(0, path.find('.'));
+        const auto section = std::find_if(keys.begin(), keys.end(), [&](const Key& key) { return key.path == head; });
+        const Role role = section == keys.end() ? k.role : std::max(k.role, section->role);
+        const Need need = k.optional ? Need::Optional : *k.fallback ? Need::Default : Need::Required;
+        return keys.emplace_back(Key{path, kind, k.unit, need, k.fallback, k.range, {}, k.example, k.doc, role});
+    }
+};
 
 std::vector<Key> make_keys()
 {
-    using enum Kind;
-    using enum Need;
-    const auto place = between(-far, far), size = above_to(0, far);
-    const auto book = Role::Bookkeeping;
-    std::vector<Key> keys{
-        {"title", Text, "", Required, "", any, {}, "\"self-weight collapse\"", "what this scene is", book},
-        {"dimensions", Integer, "", Required, "", between(2, 3), {}, "3", "3, or 2: plane strain in x-z with a full 3-D stress tensor"},
-
-        {"space", Table, "", Required, "", any, {}, "{ spacing = 0.04 }", "resolution and extent"},
-        {"space.spacing", Number, "m", Required, "", between(1e-6, 1e6), {}, "0.04", "initial distance of particles"},
-        {"space.h", Number, "spacings", Default, "", between(0.8, 3), {}, "1.3", "smoothing length; the support is 2 h"},
-        {"space.low", Vector, "m", Optional, "", place, {}, "[-1.0, -1.0, -0.5]", "lower corner of the box that particles may not leave"},
-        {"space.high", Vector, "m", Optional, "", place, {}, "[10.0, 10.0, 5.0]", "upper corner of the box that particles may not leave"},
-        {"space.periodic", Choices, "", Optional, "", any, {"x", "y", "z"}, "[\"y\"]", "axes along which space repeats from low to high"},
-
-        {"time", Table, "", Required, "", any, {}, "{ end = 1.0 }", "how long, in which steps"},
-        {"time.end", Number, "s", Required, "", above(0), {}, "1.0", "time at which the run ends", book},
-        {"time.step", Number, "s", Optional, "", above(0), {}, "1.0e-4", "fixed step; without it the step follows accuracy.cfl"},
-
-        {"time.retry",
-         Flag,
-         "",
-         Default,
-         "false",
-         any,
-         {},
-         "true",
-         "when numbers fail: back to the last good state in memory and on with half the step, once for each trouble"},
-
-        {"soil", Named, "", Required, "", any, {}, "[soil.sand]", "any number of soils, each with a name"},
-        {"soil.*", Table, "", Optional, "", any, {}, "[soil.sand]", "one soil"},
-        {"soil.*.density", Number, "kg/m^3", Required, "", above(0), {}, "1850.0", "bulk density at the start"},
-        {"soil.*.young", Number, "Pa", Required, "", above(0), {}, "1.8e6", "Young's modulus"},
-        {"soil.*.poisson", Number, "1", Required, "", from_below(0, 0.5), {}, "0.3", "Poisson's ratio"},
-        {"soil.*.cohesion", Number, "Pa", Default, "0.0", from(0), {}, "5000.0", "cohesion c"},
-        {"soil.*.friction_angle", Number, "deg", Default, "0.0", from_below(0, 90), {}, "25.0", "friction angle phi"},
-        {"soil.*.dilation_angle", Number, "deg", Default, "0.0", from_below(0, 90), {}, "0.0", "dilation angle psi, at most phi"},
-        {"soil.*.cone",
-         Choice,
-         "",
-         Default,
-         "\"compression\"",
-         any,
-         {"compression", "extension", "plane strain", "plane strain, no dilation"},
-         "\"compression\"",
-         "how the Drucker-Prager cone is fitted to c and phi"},
-        {"soil.*.tension_cutoff",
-         Number,
-         "Pa",
-         Optional,
-         "",
-         from(0),
-         {},
-         "1000.0",
-         "largest mean tension, at most the cone's apex c cot(phi)"},
-        {"soil.*.dilation_decay",
-         Number,
-         "1",
-         Optional,
-         "",
-         above(0),
-         {},
-         "0.1",
-         "plastic shear strain over which dilation dies out linearly; without it dilation stays"},
-        {"soil.*.softening",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ friction_angle = 20.0, slip = 0.02 }",
-         "strength falls linearly to a residual one"},
-        {"soil.*.softening.cohesion", Number, "Pa", Default, "0.0", from(0), {}, "0.0", "residual cohesion, at most the first"},
-        {"soil.*.softening.friction_angle",
-         Number,
-         "deg",
-         Default,
-         "0.0",
-         from_below(0, 90),
-         {},
-         "20.0",
-         "residual friction angle, at most the first"},
-        {"soil.*.softening.slip",
-         Number,
-         "m",
-         Required,
-         "",
-         above(0),
-         {},
-         "0.02",
-         "slip across a shear band (taken 2 h wide) at which the residual strength is reached"},
-        {"soil.*.rate_friction",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ friction_angle = 33.0, inertial_number = 0.3, grain = 0.001, grain_density = 2600.0 }",
-         "mu(I): friction grows with the rate of shear"},
-        {"soil.*.rate_friction.friction_angle",
-         Number,
-         "deg",
-         Required,
-         "",
-         from_below(0, 90),
-         {},
-         "33.0",
-         "friction angle of fast flow, at least that at rest"},
-        {"soil.*.rate_friction.inertial_number", Number, "1", Default, "0.3", above(0), {}, "0.3", "I_0, where half the growth is reached"},
-        {"soil.*.rate_friction.grain", Number, "m", Required, "", above(0), {}, "0.001", "diameter of a grain"},
-        {"soil.*.rate_friction.grain_density", Number, "kg/m^3", Default, "2600.0", above(0), {}, "2600.0", "density of a grain"},
-
-        {"body", Tables, "", Required, "", any, {}, "[[body]]", "soil of one shape; bodies may touch, not overlap"},
-        {"body.*.soil", Text, "", Required, "", any, {}, "\"sand\"", "name of the soil it is made of"},
-        {"body.*.velocity", Vector, "m/s", Default, "[0.0, 0.0, 0.0]", between(-1e6, 1e6), {}, "[0.0, 0.0, -1.0]", "velocity at the start"},
-        {"body.*.stress",
-         Choice,
-         "",
-         Default,
-         "\"none\"",
-         any,
-         {"none", "at rest"},
-         "\"none\"",
-         "stress at the start; \"at rest\" is K0 under its own weight"},
-
-        {"wall", Tables, "", Optional, "", any, {}, "[[wall]]", "fixed particles of one shape"},
-        {"wall.*.surface",
-         ChoiceOrTable,
-         "",
-         Default,
-         "\"rough\"",
-         any,
-         {"rough", "smooth"},
-         "\"rough\"",
-         "\"rough\" (no slip), \"smooth\" (free slip) or { friction_angle } (Coulomb)"},
-        {"wall.*.surface.friction_angle", Number, "deg", Required, "", from_below(0, 90), {}, "20.0", "Coulomb friction of the wall"},
-
-        {"effects",
-         Table,
-         "",
-         Default,
-         "{}",
-         any,
-         {},
-         "{ gravity = [0.0, 0.0, -9.81] }",
-         "what is simulated beyond the soil itself: only what is written"},
-        {"effects.gravity", Vector, "m/s^2", Optional, "", between(-1e6, 1e6), {}, "[0.0, 0.0, -9.81]", "body force per mass"},
-        {"effects.viscosity",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ alpha = 0.1, beta = 0.0 }",
-         "artificial viscosity against the P-wave speed"},
-        {"effects.viscosity.alpha", Number, "1", Required, "", between(0, 10), {}, "0.1", "linear part"},
-        {"effects.viscosity.beta", Number, "1", Default, "0.0", between(0, 10), {}, "0.0", "quadratic part"},
-        {"effects.artificial_stress",
-         ChoiceOrTable,
-         "",
-         Optional,
-         "",
-         any,
-         {"auto"},
-         "\"auto\"",
-         "against tensile instability; \"auto\" is on exactly where tension can exist"},
-        {"effects.artificial_stress.epsilon",
-         Number,
-         "1",
-         Default,
-         "0.5",
-         between(0, 1),
-         {},
-         "0.5",
-         "share of the tensile principal stress"},
-        {"effects.artificial_stress.exponent", Number, "1", Default, "2.55", above_to(0, 20), {}, "2.55", "exponent n of W(r)/W(spacing)"},
-        {"effects.stress_diffusion",
-         ChoiceOrTable,
-         "",
-         Optional,
-         "",
-         any,
-         {"auto"},
-         "{ zeta = 0.1 }",
-         "against noise in the stress; \"auto\" is on for one dry soil in boxes or cylinders under vertical gravity"},
-        {"effects.stress_diffusion.zeta", Number, "1", Default, "0.1", between(0, 1), {}, "0.1", "strength"},
-        {"effects.pore_pressure",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ table = [[0.0, 4.0], [20.0, 1.0]] }",
-         "still pore water: buoyancy and seepage of a given water table; stresses are then effective"},
-        {"effects.pore_pressure.table",
-         Points,
-         "m",
-         Required,
-         "",
-         place,
-         {},
-         "[[0.0, 4.0], [20.0, 1.0]]",
-         "its corners [x, z], x increasing"},
-        {"effects.pore_pressure.density", Number, "kg/m^3", Default, "1000.0", above(0), {}, "1000.0", "density of the water"},
-        {"effects.damping",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ ratio = 0.02, until = 0.5 }",
-         "viscous damping to settle an initial state"},
-        {"effects.damping.ratio", Number, "of critical", Required, "", above_to(0, 10), {}, "0.02", "strength"},
-        {"effects.damping.until", Number, "s", Required, "", above(0), {}, "0.5", "time at which it is switched off"},
-
-        {"accuracy", Table, "", Default, "{}", any, {}, "{ cfl = 0.2 }", "everything that trades error for time"},
-        {"accuracy.preset", Choice, "", Default, fmt::format("\"{}\"", default_preset), any, preset_names(), "\"fast\"",
-         "sets the keys of this section and space.h that are not written (docs/accuracy.md)", book},
-        {"accuracy.kernel",
-         Choice,
-         "",
-         Default,
-         "",
-         any,
-         {"cubic spline", "wendland c2", "wendland c4"},
-         "\"wendland c2\"",
-         "smoothing kernel"},
-        {"accuracy.cfl", Number, "1", Default, "", above(0), {}, "0.2", "Courant number of the step where time.step is absent"},
-        {"accuracy.precision",
-         Choice,
-         "",
-         Default,
-         "",
-         any,
-         {"double", "mixed"},
-         "\"double\"",
-         "\"mixed\": pair sums in single, state in double precision"},
-        {"accuracy.correction",
-         Choice,
-         "",
-         Default,
-         "",
-         any,
-         {"none", "gradient"},
-         "\"none\"",
-         "\"gradient\": velocity gradients exact for linear fields, also at surfaces"},
-        {"accuracy.skin",
-         Number,
-         "supports",
-         Default,
-         "",
-         between(0.01, 0.5),
-         {},
-         "0.1",
-         "reach of neighbour lists beyond the support: cost only"},
-        {"accuracy.sleep_below",
-         Number,
-         "m/s",
-         Default,
-         "0.0",
-         from(0),
-         {},
-         "0.001",
-         "soil slower than this, and not about to move, among soil that is too, keeps its state until it is looked at again "
-         "(docs/performance.md); 0: never"},
-
-        {"output", Table, "", Default, "{}", any, {}, "{ every = 0.05 }", "what a run leaves in its directory", book},
-        {"output.directory",
-         Text,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "\"results/seed-52\"",
-         "result directory; without it results/<scene file's name>",
-         book},
-        {"output.every",
-         Number,
-         "s",
-         Optional,
-         "",
-         above(0),
-         {},
-         "0.05",
-         "time between snapshots; without it the first and the last state",
-         book},
-        {"output.fields",
-         Choices,
-         "",
-         Default,
-         R"(["velocity", "stress", "density", "plastic_strain", "displacement"])",
-         any,
-         {"velocity", "stress", "density", "plastic_strain", "displacement"},
-         "[\"velocity\", \"stress\"]",
-         "fields of snapshots beside position, id, kind and soil",
-         book},
-        {"output.history",
-         Number,
-         "s",
-         Optional,
-         "",
-         above(0),
-         {},
-         "0.001",
-         "time between rows of history.csv; without it the first and the last state",
-         book},
-        {"output.grain",
-         Number,
-         "m",
-         Optional,
-         "",
-         above(0),
-         {},
-         "0.04",
-         "height from which a column counts as soil in history.csv; without it one spacing",
-         book},
-        {"output.checkpoint_minutes", Number, "min", Default, "30.0", above(0), {}, "30.0", "wall time between checkpoints", book},
-        {"output.picture",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         R"({ view = "oblique", color = "displacement" })",
-         "pictures of the snapshots",
-         book},
-        {"output.picture.view",
-         Choice,
-         "",
-         Default,
-         "\"oblique\"",
-         any,
-         {"oblique", "side", "top", "cut"},
-         "\"oblique\"",
-         "where from; \"cut\": a slice two spacings thick along x, through the middle of the soil at the start",
-         book},
-        {"output.picture.color",
-         Choice,
-         "",
-         Default,
-         "\"displacement\"",
-         any,
-         {"displacement", "speed", "plastic_strain", "pressure"},
-         "\"displacement\"",
-         "what the colour shows",
-         book},
-        {"output.picture.range",
-         Pair,
-         "of the colour",
-         Optional,
-         "",
-         any,
-         {},
-         "[0.0, 1.0]",
-         "least and largest value of the colours (m, m/s, 1, Pa), the same in every picture; without it what the soil shows, anew each "
-         "time",
-         book},
-        {"output.movie", Flag, "", Default, "false", any, {}, "true", "the pictures as a film at the end (needs ffmpeg)", book},
+    Collector collector;
+    Scene scene;
+    describe(collector, scene);
+    auto& keys = collector.keys;
+    const auto row = [&](std::string_view path) -> Key& {
+        const auto found = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path == path; });
+        ensure(found != keys.end(), "a preset sets a key that no scene has");
+        return *found;
     };
-    const std::vector<Key> shapes{
-        {"box", Table, "", Optional, "", any, {}, "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }", "a box of whole spacings a side"},
-        {"box.low", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "lower corner"},
-        {"box.high", Vector, "m", Required, "", place, {}, "[1.0, 1.0, 1.0]", "upper corner"},
-        {"cylinder",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ base = [0.0, 0.0, 0.0], radius = 0.1, height = 0.2 }",
-         "an upright cylinder (3-D)"},
-        {"cylinder.base", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "centre of its lower face"},
-        {"cylinder.radius", Number, "m", Required, "", size, {}, "0.1", "radius"},
-        {"cylinder.height", Number, "m", Required, "", size, {}, "0.2", "height along z"},
-        {"sphere", Table, "", Optional, "", any, {}, "{ center = [0.0, 0.0, 0.0], radius = 0.1 }", "a sphere, in 2-D a disc"},
-        {"sphere.center", Vector, "m", Required, "", place, {}, "[0.0, 0.0, 0.0]", "centre"},
-        {"sphere.radius", Number, "m", Required, "", size, {}, "0.1", "radius"},
-        {"polygon",
-         Table,
-         "",
-         Optional,
-         "",
-         any,
-         {},
-         "{ points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], y = [0.0, 1.0] }",
-         "a polygon in x-z, drawn out along y"},
-        {"polygon.points", Points, "m", Required, "", place, {}, "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]", "its corners [x, z] in order"},
-        {"polygon.y", Pair, "m", Optional, "", place, {}, "[0.0, 1.0]", "its extent along y; needed in 3-D, left out in 2-D"},
-    };
-    for (const char* parent : {"body.*.", "wall.*."}) {
-        const auto at = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path.starts_with(parent); });
-        auto rows = shapes;
-        for (auto& row : rows) row.path = parent + row.path;
-        keys.insert(at, rows.begin(), rows.end());
-    }
-    // The defaults of what a preset sets are written once, there.
+    const std::string standard = row("accuracy.preset").fallback;
     for (const auto& preset : presets())
-        if (preset.name == default_preset)
-            for (const auto& [path, value] : preset.settings)
-                std::find_if(keys.begin(), keys.end(), [&, &path = path](const Key& k) { return k.path == path; })->fallback = value;
-    return keys;
+        if (fmt::format("\"{}\"", preset.name) == standard)
+            for (const auto& [path, value] : preset.settings) row(path).need = Need::Default, row(path).fallback = value;
+    return std::move(keys);
 }
 
 } // namespace
@@ -461,6 +141,16 @@ const std::vector<Preset>& presets()
 {
     static const std::vector<Preset> all = make_presets();
     return all;
+}
+
+const Words<scene::Preset>& preset_words()
+{
+    static const auto words = [] {
+        Words<scene::Preset> all;
+        for (const auto& p : presets()) all.push_back({p.name.c_str(), p.value});
+        return all;
+    }();
+    return words;
 }
 
 const KeyTable& scene_keys()

@@ -16,23 +16,57 @@ const char* const name_of_base = "base";
 
 using Settings = std::vector<std::pair<std::string, std::string>>; // key, value as TOML
 
+/// The keys of a sweep. Settings are keys of a scene, which are checked when they are read.
+const KeyTable& sweep_keys()
+{
+    using enum Kind;
+    using enum Need;
+    const Range any{};
+    static const KeyTable keys(
+        "a sweep",
+        {
+            {"title", Text, "", Optional, "", any, {}, "\"error against time\"", "what it is for; without it the file's name"},
+            {"scene", Text, "", Required, "", any, {}, "\"column.toml\"", "path of the scene file, from the sweep's directory"},
+            {"threads", Integer, "", Default, "1", between(1, 4096), {}, "1", "threads of every run"},
+            {"grain", Number, "m", Optional, "", between(1e-9, 1e9), {}, "0.005", "height at which the run-out is taken"},
+            {"measures", Choices, "", Required, "", any, measure_names(), "[\"profile\"]", "what is compared, the most important first"},
+
+            {"reference", Table, "", Default, "{ finest = true }", any, {}, "{ finest = true }", "what errors count from"},
+            {"reference.finest", TextOrTrue, "", OneOf, "", any, {}, "true", "the finest run, of this curve where it is a name"},
+            {"reference.closed_form", Choice, "", OneOf, "", any, {"k0 column"}, "\"k0 column\"", "a solution in closed form"},
+            {"reference.profile", Text, "", OneOf, "", any, {}, "\"surface.csv\"", "an experiment's surface: CSV of x, z in m"},
+            {"reference.failure", Text, "", Optional, "", any, {}, "\"failure.csv\"", "its failure line"},
+            {"reference.scatter", Number, "1", Default, "0.0", between(0, 1), {}, "0.05", "below which no error means anything"},
+
+            {"base", Settings, "", Optional, "", any, {}, "{ preset = \"fast\" }", "settings of every point"},
+            {"vary", Settings, "", Optional, "", any, {}, "{ preset = [\"seed\", \"fast\"] }", "lists of values, all against all"},
+            {"presets", Settings, "", Optional, "", any, {}, "{ wide = { preset = \"fast\" } }", "named settings"},
+            {"point", Tables, "", Optional, "", any, {}, "[[point]]", "one point beside the base"},
+            {"point.*", Settings, "", Optional, "", any, {}, "[[point]]", "its settings"},
+            {"point.*.name", Text, "", Required, "", any, {}, "\"mixed precision\"", "what figures call it"},
+        });
+    return keys;
+}
+
 /// Reads the tables of one file and knows the line of everything it complains of.
 class SweepReader {
 public:
-    SweepReader(std::string_view text, const Path& name) : name_(name.string()), folder_(name.parent_path())
+    SweepReader(std::string_view text, const Path& name)
+        : name_(name.string()), folder_(name.parent_path()), file_(text, name_, sweep_keys())
     {
-        root_ = Document(text, name_, scene_keys()).root;
+        file_.check();
     }
 
     Sweep read()
     {
-        known(root_, "", {"title", "scene", "threads", "grain", "measures", "reference", "base", "vary", "presets", "point"});
         Sweep s;
-        s.title = has("title") ? text(*root_.get("title"), "title") : Path(name_).stem().string();
-        s.scene = path("scene", "a path of a scene file", "scene = \"column.toml\"");
-        if (has("threads")) s.threads = int(number(*root_.get("threads"), "threads", 1, 4096, "1"));
-        if (has("grain")) s.grain = number(*root_.get("grain"), "grain", 1e-9, 1e9, "0.005");
-        read_measures(s);
+        s.title = file_.find("title") ? filled("title") : Path(name_).stem().string();
+        s.scene = from_folder(filled("scene"));
+        s.threads = file_.integer("threads");
+        if (file_.find("grain")) s.grain = file_.number("grain");
+        const auto& names = measure_names();
+        for (const auto& word : file_.texts("measures"))
+            s.measures.push_back(Measure(std::find(names.begin(), names.end(), word) - names.begin()));
         read_reference(s);
         read_points(s);
         return s;
@@ -44,38 +78,19 @@ private:
         const auto line = at ? at->source().begin.line : 0;
         throw BadInput(fmt::format("{}:{}: {}: {}", name_, line ? line : 1, key, why));
     }
-    bool has(const char* key) const { return root_.contains(key); }
-
-    void known(const toml::table& table, const std::string& path, const std::vector<std::string>& keys) const
-    {
-        for (const auto& [key, node] : table)
-            if (std::find(keys.begin(), keys.end(), key.str()) == keys.end())
-                refuse(&node, path + std::string(key.str()),
-                       fmt::format("expected a known key, found \"{}\"; did you mean \"{}\"? Known here: {}", key.str(),
-                                   nearest(key.str(), keys), fmt::join(keys, ", ")));
-    }
     std::string text(const toml::node& node, const std::string& key) const
     {
         if (const auto s = node.value<std::string>(); s && node.is_string() && !s->empty()) return *s;
-        refuse(&node, key, "expected a string, found something else; put it in quotes");
-    }
-    double number(const toml::node& node, const std::string& key, double low, double high, const char* example) const
-    {
-        if (const auto x = node.value<double>(); x && node.is_number() && *x >= low && *x <= high) return *x;
-        refuse(&node, key,
-               fmt::format("expected a number from {:g} to {:g}, found {}; write, for example, {}", low, high, as_toml(node), example));
+        refuse(&node, key, fmt::format("expected words in quotes, found {}; write, for example, \"fast\"", as_toml(node)));
     }
     const toml::table& table(const toml::node& node, const std::string& key) const
     {
         if (const auto* t = node.as_table()) return *t;
         refuse(&node, key, fmt::format("expected a table, found {}; write [{}]", as_toml(node), key));
     }
-    Path file(const std::string& name) const { return Path(name).is_absolute() ? Path(name) : folder_ / name; }
-    Path path(const char* key, const char* what, const char* example) const
-    {
-        if (!has(key)) refuse(nullptr, key, fmt::format("expected {}, found nothing; write, for example, {}", what, example));
-        return file(text(*root_.get(key), key));
-    }
+    /// A string of the file that says something.
+    std::string filled(const std::string& key) const { return text(file_.at(key), key); }
+    Path from_folder(const std::string& name) const { return Path(name).is_absolute() ? Path(name) : folder_ / name; }
     static std::string as_toml(const toml::node& node)
     {
         if (const auto* x = node.as_floating_point()) return fmt::format("{}", x->get()); // 0.1, not 0.10000000000000001
@@ -84,60 +99,21 @@ private:
         return out.str();
     }
 
-    void read_measures(Sweep& s) const
-    {
-        const auto& names = measure_names();
-        const auto* node = root_.get("measures");
-        const auto* array = node ? node->as_array() : nullptr;
-        if (!array || array->empty())
-            refuse(node, "measures",
-                   fmt::format("expected an array of some of \"{}\", the most important first; write, for example, [\"{}\"]",
-                               fmt::join(names, "\", \""), names.front()));
-        for (const auto& m : *array) {
-            const auto word = text(m, "measures");
-            const auto found = std::find(names.begin(), names.end(), word);
-            if (found == names.end())
-                refuse(&m, "measures",
-                       fmt::format("expected one of \"{}\", found \"{}\"; did you mean \"{}\"?", fmt::join(names, "\", \""), word,
-                                   nearest(word, names)));
-            const auto measure = Measure(found - names.begin());
-            if (std::find(s.measures.begin(), s.measures.end(), measure) != s.measures.end())
-                refuse(&m, "measures", fmt::format("expected each measure once, found \"{}\" twice; name it once", word));
-            s.measures.push_back(measure);
-        }
-    }
-
-    /// Without one it is the finest run.
-    void read_reference_kind(Sweep& s, const toml::node* node) const
-    {
-        const auto& t = table(*node, "reference");
-        known(t, "reference.", {"finest", "closed_form", "profile", "failure", "scatter"});
-        const int kinds = int(t.contains("finest")) + int(t.contains("closed_form")) + int(t.contains("profile"));
-        if (kinds != 1)
-            refuse(node, "reference", fmt::format("expected exactly one of finest, closed_form, profile, found {}; leave one", kinds));
-        if (const auto* finest = t.get("finest")) {
-            if (finest->is_string()) s.reference.curve = text(*finest, "reference.finest");
-            else if (!finest->value<bool>().value_or(false) || !finest->is_boolean())
-                refuse(finest, "reference.finest", "expected true or the name of a curve; write finest = true");
-        } else if (const auto* closed = t.get("closed_form")) {
-            if (text(*closed, "reference.closed_form") != "k0 column")
-                refuse(closed, "reference.closed_form",
-                       fmt::format("expected \"k0 column\", found {}; it is the only one", as_toml(*closed)));
-            s.reference.kind = SweepReference::Kind::ClosedForm;
-        } else {
-            s.reference.kind = SweepReference::Kind::Experiment;
-            s.reference.profile = file(text(*t.get("profile"), "reference.profile"));
-            if (const auto* f = t.get("failure")) s.reference.failure = file(text(*f, "reference.failure"));
-            if (const auto* f = t.get("scatter")) s.reference.scatter = number(*f, "reference.scatter", 0, 1, "0.05");
-        }
-    }
     void read_reference(Sweep& s) const
     {
-        const auto* node = root_.get("reference");
-        if (node) read_reference_kind(s, node);
+        if (file_.find("reference.profile")) {
+            s.reference.kind = SweepReference::Kind::Experiment;
+            s.reference.profile = from_folder(filled("reference.profile"));
+            if (file_.find("reference.failure")) s.reference.failure = from_folder(filled("reference.failure"));
+            s.reference.scatter = file_.number("reference.scatter");
+        } else if (file_.find("reference.closed_form")) {
+            s.reference.kind = SweepReference::Kind::ClosedForm; // of which there is one
+        } else if (file_.at("reference.finest").is_string()) {
+            s.reference.curve = filled("reference.finest");
+        }
         const auto needs = [&](Measure m, bool met, const char* what) {
             if (!met && std::find(s.measures.begin(), s.measures.end(), m) != s.measures.end())
-                refuse(node, "reference",
+                refuse(file_.find("reference"), "reference",
                        fmt::format("the measure \"{}\" needs {}; add it or leave the measure out", measure_names()[std::size_t(m)], what));
         };
         const bool closed = s.reference.kind == SweepReference::Kind::ClosedForm;
@@ -211,8 +187,8 @@ private:
 
     void read_points(Sweep& s)
     {
-        if (const auto* node = root_.get("presets"))
-            for (const auto& [name, preset] : table(*node, "presets")) {
+        if (const auto* node = file_.root.get("presets"))
+            for (const auto& [name, preset] : *node->as_table()) {
                 const std::string key = "presets." + std::string(name.str());
                 for (const auto& p : presets())
                     if (p.name == name.str())
@@ -228,22 +204,18 @@ private:
                 own_presets_[std::string(name.str())] = settings;
             }
         Settings base;
-        const auto* base_node = root_.get("base");
-        if (base_node) flatten(table(*base_node, "base"), "", "base.", base, {});
+        const auto* base_node = file_.root.get("base");
+        if (base_node) flatten(*base_node->as_table(), "", "base.", base, {});
         std::stable_partition(base.begin(), base.end(), [](const auto& x) { return x.first == "preset"; });
 
         read_vary(s, base);
-        const auto* node = root_.get("point");
+        const auto* node = file_.root.get("point");
         if (node) {
-            const auto* array = node->as_array();
-            if (!array) refuse(node, "point", "expected tables [[point]], found something else; write [[point]]");
             const toml::node& where = base_node ? *base_node : *node;
             s.points.push_back({name_of_base, sets_of(expanded(base, where)), true});
             std::vector<std::string> names{name_of_base};
-            for (const auto& element : *array) {
-                const auto& t = table(element, "point");
-                if (!t.contains("name"))
-                    refuse(&element, "point.name", "expected a name, found nothing; write, for example, name = \"mixed precision\"");
+            for (const auto& element : *node->as_array()) {
+                const auto& t = *element.as_table();
                 const auto name = text(*t.get("name"), "point.name");
                 if (std::find(names.begin(), names.end(), name) != names.end())
                     refuse(&element, "point.name", fmt::format("expected a name of its own, found \"{}\" again; rename it", name));
@@ -263,7 +235,7 @@ private:
 
     void read_vary(Sweep& s, const Settings& base)
     {
-        const auto* node = root_.get("vary");
+        const auto* node = file_.root.get("vary");
         if (!node) return;
         struct List {
             std::string key;
@@ -291,7 +263,7 @@ private:
                 lists.push_back(std::move(list));
             }
         };
-        collect(table(*node, "vary"), "");
+        collect(*node->as_table(), "");
         if (lists.empty())
             refuse(node, "vary", "expected lists of values, found none; write, for example, \"space.spacing\" = [0.02, 0.01]");
         // A preset first: single keys override it.
@@ -319,7 +291,7 @@ private:
 
     std::string name_;
     Path folder_;
-    toml::table root_;
+    Document file_;
     std::map<std::string, Settings> own_presets_;
 };
 

@@ -1,9 +1,10 @@
 #pragma once
 // A cloud of particles without a scene file: jittered lattice with smooth fields, sorted and with lists, for benchmarks
 // and for tests of the pair pass.
-#include "solver/kernels/step.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
+#include <numeric>
 #include <random>
 
 namespace kuzure::bench {
@@ -37,8 +38,7 @@ struct Cloud {
         columns = Columns::of(scene, {0, 0, 0});
         for (const auto& soil : s.soils) soils.push_back(Material::from(soil));
         auto& p = particles;
-        p.require(field::velocity, field::half_velocity, field::density, field::half_density, field::stress, field::half_stress,
-                  field::plastic_strain, field::sorted_position, field::soil, field::id);
+        p.require(field::velocity, field::density, field::stress, field::plastic_strain, field::sorted_position, field::soil, field::id);
         const int ny = s.dimensions == 2 ? 1 : n;
         p.resize(n * ny * n);
         std::mt19937_64 g(seed);
@@ -52,13 +52,13 @@ struct Cloud {
                     p[field::position].set(i, Vector{x, y, z});
                     const Vector v{0.8 * std::sin(2 * x) + 0.02 * u(g), s.dimensions == 2 ? 0 : 0.5 * std::cos(3 * y + z) + 0.02 * u(g),
                                    -0.7 * z * std::cos(x) + 0.02 * u(g)};
-                    p[field::velocity].set(i, v), p[field::half_velocity].set(i, v);
+                    p[field::velocity].set(i, v);
                     const double rho = s.soils[0].density * (1 + 0.002 * u(g));
-                    p[field::density].set(i, rho), p[field::half_density].set(i, rho);
+                    p[field::density].set(i, rho);
                     const double depth = s.soils[0].density * 9.81 * (n * dx - z);
                     const Stress sigma{
                         -0.5 * depth + 50 * u(g), -0.5 * depth + 50 * u(g), -depth + 50 * u(g), 100 * u(g), 100 * u(g), 100 * u(g)};
-                    p[field::stress].set(i, sigma), p[field::half_stress].set(i, sigma);
+                    p[field::stress].set(i, sigma);
                     p[field::id].set(i, std::int64_t(i));
                 }
         for (int w = 0; w < int(s.walls.size()); ++w) {
@@ -90,47 +90,35 @@ struct Cloud {
         lists.build(columns, owned, ghosts, walls, scene.support() * (1 + skin), width);
     }
 
-    template <class T> void make_records(Array<Record<T>>& records) const
+    /// What a step of length dt asks of a model; the kick alike.
+    StepInput input(double dt)
     {
-        const Places<T> place(scene.smoothing_length());
-        const auto& p = particles;
-        records.resize(p.size() + Particles::padding + 1);
-        for (Index i = 0; i < p.size(); ++i) {
-            const auto& m = soils[p[field::soil][i]];
-            records[i] = make_record<T>(place, p[field::position][i], p[field::velocity][i],
-                                        scene.particle_volume() * m.density / p[field::density][i], p[field::density][i],
-                                        p[field::stress][i], m.sound_speed);
+        StepInput in{.particles = &particles, .lists = &lists, .soils = soils, .dt = dt, .kick = dt, .energy_unit = 1e-12};
+        in.forces.gravity = scene.effects.gravity.value_or(Vector{});
+        for (const auto& m : soils) in.evolving = in.evolving || m.evolves();
+        return in;
+    }
+    /// Sorted, with lists for a model, its records and walls; the cloud may not move while the model is used.
+    void prepare(PairModel& model, double skin)
+    {
+        model.require_fields(particles);
+        model.start(particles);
+        sort();
+        build(model.cluster_width(), skin);
+        model.make_records(particles, soils, {});
+        model.place_walls(scene.walls, walls);
+    }
+    /// All stages of one step over all clusters.
+    PassResult step(PairModel& model, const StepInput& in)
+    {
+        std::vector<Index> all(lists.size());
+        std::iota(all.begin(), all.end(), 0);
+        PassResult result;
+        for (int stage = 0; stage < int(model.stages().size()); ++stage) {
+            result.add(model.run(stage, in, all));
+            model.end_stage(stage);
         }
-        far_away(records);
-    }
-    template <class T> void far_away(Array<Record<T>>& records) const
-    {
-        Record<T> r{};
-        if constexpr (std::is_same_v<T, double>) r.x = r.y = r.z = 1e6;
-        else r.x = r.y = r.z = 1 << 30;
-        r.density = T(1000);
-        for (Index i = particles.size(); i < Index(records.size()); ++i) records[i] = r;
-    }
-    /// The walls' points as the pair loop reads them; good as long as the cloud stays where it is.
-    template <class T> std::vector<WallRecords<T>> wall_records() const
-    {
-        const Places<T> place(scene.smoothing_length());
-        std::vector<WallRecords<T>> all;
-        for (const auto& w : walls) {
-            auto& r = all.emplace_back();
-            r.wall = &scene.walls[std::size_t(w.wall)];
-            for (std::size_t k = 0; k < w.x.size(); ++k)
-                r.x.push_back(place(w.x[k])), r.y.push_back(place(w.y[k])), r.z.push_back(place(w.z[k]));
-        }
-        return all;
-    }
-    template <class T> Pass<T> pass(const Array<Record<T>>& records, Array<Record<T>>& next, double dt)
-    {
-        Pass<T> p{};
-        p.particles = &particles, p.records = records.data(), p.next = next.data();
-        p.lists = &lists, p.soils = soils, p.volume = scene.particle_volume(), p.h = scene.smoothing_length();
-        p.dt = dt, p.kick = dt, p.forces.gravity = scene.effects.gravity.value_or(Vector{}), p.energy_unit = 1e-12;
-        return p;
+        return result;
     }
 };
 

@@ -3,8 +3,8 @@
 //   build/release/bench_guard [SCENE.toml] [ROUNDS]          default: jobs/scenes/quickstart.toml, 15
 #include "decomposition/comm.hpp"
 #include "io/scene_file.hpp"
-#include "solver/app/energy.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/energy.hpp"
+#include "solver/run/simulation.hpp"
 #include <algorithm>
 #include <cstdlib>
 #include <fmt/format.h>

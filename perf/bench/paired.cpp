@@ -13,7 +13,7 @@ namespace {
 constexpr int edge = 40;
 constexpr double jitter = 0.2;
 
-double timed(bench::ReadyPass<double>& p)
+double timed(bench::ReadyPass& p)
 {
     const double begin = omp_get_wtime();
     for (int k = 0; k < p.cycle; ++k) p.run();
@@ -53,7 +53,7 @@ int main(int argc, char** argv)
         if (w.name == "cubic" || (!names.empty() && std::find(names.begin(), names.end(), w.name) == names.end())) continue;
         const std::string against =
             w.name.starts_with("wendland") && w.name != "wendland_c2" && w.name != "wendland_c4_everything" ? "wendland_c2" : "cubic";
-        bench::ReadyPass<double> bare(find(against)->scene, Arithmetic::Lanes, edge, jitter), it(w.scene, Arithmetic::Lanes, edge, jitter);
+        bench::ReadyPass bare(find(against)->scene, Arithmetic::Simd, edge, jitter), it(w.scene, Arithmetic::Simd, edge, jitter);
         std::vector<double> a, b, ratio;
         timed(bare), timed(it);
         for (int k = 0; k < rounds; ++k) {

@@ -40,17 +40,17 @@ const Machine& roofs()
     return m;
 }
 
-template <class T> void pass(benchmark::State& state, const Scene& s, Arithmetic arithmetic)
+void pass(benchmark::State& state, const Scene& s, Arithmetic arithmetic)
 {
     omp_set_num_threads(int(state.range(0)));
-    bench::ReadyPass<T> ready(s, arithmetic, edge, jitter);
+    bench::ReadyPass ready(s, arithmetic, edge, jitter);
     std::int64_t pairs = 0;
     for (auto _ : state)
         for (int k = 0; k < ready.cycle; ++k) pairs = ready.run();
     using benchmark::Counter;
     state.counters["ns/pair"] = Counter(double(ready.cycle * pairs) * 1e-9, Counter::kIsIterationInvariantRate | Counter::kInvert);
     state.counters["Gflop/s"] = Counter(ready.cycle * ready.flops(pairs) * 1e-9, Counter::kIsIterationInvariantRate);
-    const bool one = state.range(0) == 1, mixed = std::is_same_v<T, float>;
+    const bool one = state.range(0) == 1, mixed = s.accuracy.precision == scene::Precision::Mixed;
     const Machine& m = roofs();
     const double peak = mixed ? (one ? m.gflops_float_one : m.gflops_float_all) : (one ? m.gflops_double_one : m.gflops_double_all);
     const double band = one ? m.gbytes_one : m.gbytes_all;
@@ -68,16 +68,13 @@ int main(int argc, char** argv)
 {
     using scene::Precision;
     for (const auto precision : {Precision::Double, Precision::Mixed})
-        for (const auto arithmetic : {Arithmetic::Lanes, Arithmetic::Plain})
+        for (const auto arithmetic : {Arithmetic::Simd, Arithmetic::Scalar})
             for (const auto& [name, scene] : bench::workloads(precision)) {
                 const std::string title = "pass/" + name + (precision == Precision::Mixed ? "/mixed" : "/double") +
-                                          (arithmetic == Arithmetic::Plain ? "/plain" : "/lanes");
-                const auto body = [=](benchmark::State& state) {
-                    if (precision == Precision::Mixed) pass<float>(state, scene, arithmetic);
-                    else pass<double>(state, scene, arithmetic);
-                };
+                                          (arithmetic == Arithmetic::Scalar ? "/plain" : "/lanes");
+                const auto body = [=](benchmark::State& state) { pass(state, scene, arithmetic); };
                 auto* b = benchmark::RegisterBenchmark(title.c_str(), body)->Unit(benchmark::kMillisecond)->UseRealTime()->Arg(1);
-                if (arithmetic == Arithmetic::Lanes) b->Arg(2);
+                if (arithmetic == Arithmetic::Simd) b->Arg(2);
             }
     benchmark::Initialize(&argc, argv);
     roofs(); // measured before anything else runs

@@ -1,7 +1,6 @@
 #pragma once
 // The scenes whose pair passes are measured, by name, and one pass made ready to be run again and again.
 #include "perf/bench/cloud.hpp"
-#include <numeric>
 #include <omp.h>
 
 namespace kuzure::bench {
@@ -49,50 +48,43 @@ inline std::vector<Workload> workloads(scene::Precision precision)
     return all;
 }
 
-/// The pass of one workload; a step of no length, so the state stays and the work is the same every time. As in a collapse,
-/// one pass in `cycle` prunes the lists, with a margin for the others.
-template <class T> class ReadyPass {
+/// The passes of one workload; a step of no length, so the state stays and the work is the same every time. As in a collapse,
+/// one step in `cycle` prunes the lists, with a margin for the others.
+class ReadyPass {
 public:
     static constexpr int cycle = 5;
-    ReadyPass(const Scene& s, Arithmetic arithmetic, int edge, double jitter)
-        : model_(choose_model(s, arithmetic)), cloud_(edge, jitter, s), water_(PoreWater::from(s.effects))
+    ReadyPass(const Scene& s, Arithmetic arithmetic, int edge, double jitter) : model_(choose_model(s, arithmetic)), cloud_(edge, jitter, s)
     {
 #pragma omp parallel
         flush_denormals();
-        cloud_.sort();
-        cloud_.build(model_->cluster_width(), s.accuracy.skin);
-        cloud_.make_records(now_);
-        next_.resize(now_.size()), tension_.resize(now_.size()), next_tension_.resize(now_.size());
-        for (auto& t : tension_) t = {};
-        clusters_.resize(cloud_.lists.size());
-        std::iota(clusters_.begin(), clusters_.end(), 0);
-        for (const auto& m : cloud_.soils) evolving_ = evolving_ || m.evolves();
+        cloud_.prepare(*model_, s.accuracy.skin);
     }
-    /// Directed pairs of one pass.
+    /// Directed pairs of one step.
     std::int64_t run()
     {
-        auto p = cloud_.pass(now_, next_, 0);
-        p.prune = passes_++ % cycle == 0, p.margin = 0.026 * cloud_.scene.support();
-        p.kick = 0, p.tension = tension_.data(), p.next_tension = next_tension_.data();
-        p.water = water_.present() ? &water_ : nullptr, p.evolving = evolving_;
-        return model_->run(p, clusters_).pairs;
+        StepInput in = cloud_.input(0);
+        in.prune = passes_++ % cycle == 0, in.margin = 0.026 * cloud_.scene.support();
+        return cloud_.step(*model_, in).pairs;
     }
     double flops(std::int64_t pairs) const
     {
-        return double(pairs) * model_->flops_per_pair() + double(cloud_.particles.size()) * model_->flops_per_particle();
+        double sum = 0;
+        for (const Stage& s : model_->stages())
+            sum += double(pairs) * s.flops_per_pair + double(cloud_.particles.size()) * s.flops_per_particle;
+        return sum;
     }
-    double bytes() const { return double(cloud_.particles.size()) * model_->bytes_per_particle(); }
+    double bytes() const
+    {
+        double sum = 0;
+        for (const Stage& s : model_->stages()) sum += double(cloud_.particles.size()) * s.bytes_per_particle;
+        return sum;
+    }
     std::string model() const { return model_->name(); }
 
 private:
     std::unique_ptr<PairModel> model_;
     Cloud cloud_;
-    PoreWater water_;
-    bool evolving_ = false;
     std::int64_t passes_ = 0;
-    Array<Record<T>> now_, next_;
-    Array<Tension<T>> tension_, next_tension_;
-    std::vector<Index> clusters_;
 };
 
 } // namespace kuzure::bench

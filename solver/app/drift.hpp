@@ -2,7 +2,7 @@
 // How good later cuts between neighbours are on many ranks, without a run: soil moved in small steps from its start to a
 // later state, the cut evened out at each by as many imagined ranks.
 #include "decomposition/even_out.hpp"
-#include "solver/app/scaling.hpp"
+#include "solver/run/scaling.hpp"
 
 namespace kuzure {
 

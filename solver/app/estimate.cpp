@@ -63,8 +63,8 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const bool mixed = model.precision() == scene::Precision::Mixed;
     e.mixed = mixed;
     e.support = k;
-    e.record = (mixed ? 64 : 128) * (model.tensile() ? 1.5 : 1.0);
-    const double records = 2.0 * e.record;
+    e.record = double(row_bytes(model));
+    const double records = double(model.record_bytes());
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
     const double columns = scene::column_bytes(f) + (s.accuracy.sleep_below > 0 ? 4.0 * double(e.soil) : 0);

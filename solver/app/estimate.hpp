@@ -2,7 +2,7 @@
 // What a run will need, known before anything is allocated or written, and whether this machine has it.
 #include "decomposition/comm.hpp"
 #include "io/file.hpp"
-#include "solver/kernels/step.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
 #include <string>

@@ -1,5 +1,5 @@
 #include "solver/app/forecast.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/simulation.hpp"
 #include "solver/scene/check.hpp"
 #include <algorithm>
 #include <cmath>
@@ -71,7 +71,7 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     const auto& t = sim.timers();
     const double rebuild = t.seconds(Phase::Migrate) + t.seconds(Phase::Sort) + t.seconds(Phase::Ghosts) + t.seconds(Phase::Lists);
     m.rebuild_particle = comm.max(rebuild) / std::max<double>(1, double(sim.filling().soil_count()) *
-                                                                     double(std::max<std::int64_t>(1, sim.structure().rebuilds)));
+                                                                     double(std::max<std::int64_t>(1, sim.rebuilds())));
     // Rounds of about 30 ms each: as many steps as that takes.
     const double first = comm.max(t.seconds(Phase::Interior) + t.seconds(Phase::Rim)) / 2;
     const int steps = std::clamp(int(0.03 / std::max(first, 1e-6)), 2, 50);

@@ -2,7 +2,7 @@
 // Seconds that a run will take on a machine of jobs/machines.
 #include "io/machine_profile.hpp"
 #include "solver/app/estimate.hpp"
-#include "solver/app/scaling.hpp"
+#include "solver/run/scaling.hpp"
 #include <span>
 #include <vector>
 

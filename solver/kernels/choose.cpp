@@ -1,5 +1,5 @@
 #include "solver/core/ensure.hpp"
-#include "solver/kernels/step.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include "solver/kernels/variants.hpp"
 #include "solver/scene/scene.hpp"
 
@@ -27,5 +27,12 @@ std::unique_ptr<PairModel> choose_model(const scene::Interactions& s, Arithmetic
     return first_that_covers<KUZURE_FIRST_VARIANT>(s, a);
 }
 std::unique_ptr<PairModel> choose_model(const Scene& s, Arithmetic a) { return choose_model(s.interactions(), a); }
+
+std::size_t row_bytes(const PairModel& model)
+{
+    std::size_t b = 0;
+    for (const Stage& s : model.stages()) b += s.row_bytes;
+    return b;
+}
 
 } // namespace kuzure

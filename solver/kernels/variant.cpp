@@ -1,5 +1,5 @@
 // Compiled once per entry of Variants, with -DVARIANT=0, 1, 2, ...
-#include "solver/kernels/pass_impl.hpp"
+#include "solver/kernels/leap_frog.hpp"
 #include "solver/kernels/variants.hpp"
 
 namespace kuzure {
@@ -10,10 +10,10 @@ template <> std::unique_ptr<PairModel> make_variant<VARIANT>(const scene::Intera
 {
     using M = std::tuple_element_t<VARIANT, Variants>;
     const bool mixed = s.precision == scene::Precision::Mixed;
-    if (a == Arithmetic::Plain && mixed) return std::make_unique<Compiled<M, float>>(s);
-    if (a == Arithmetic::Plain) return std::make_unique<Compiled<M, double>>(s);
-    if (mixed) return std::make_unique<Compiled<M, Native<float>>>(s);
-    return std::make_unique<Compiled<M, Native<double>>>(s);
+    if (a == Arithmetic::Scalar && mixed) return std::make_unique<LeapFrog<M, float>>(s);
+    if (a == Arithmetic::Scalar) return std::make_unique<LeapFrog<M, double>>(s);
+    if (mixed) return std::make_unique<LeapFrog<M, Native<float>>>(s);
+    return std::make_unique<LeapFrog<M, Native<double>>>(s);
 }
 
 } // namespace kuzure

@@ -1,7 +1,7 @@
 #pragma once
 // The pair models that are compiled, one object file each, cheapest first. A scene gets the first that covers it; the
 // last of each kernel covers everything. To make a new combination fast, add a line and raise the number.
-#include "solver/physics/model.hpp"
+#include "solver/kernels/model.hpp"
 #include <tuple>
 
 namespace kuzure {

@@ -377,7 +377,7 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
     } else if (scene.accuracy.cfl > recommended_courant) {
         rules.warning("accuracy.cfl", text("{} is stable but above the recommended {}", scene.accuracy.cfl, recommended_courant));
     }
-    if (scene.accuracy.sleep_below > 0 && steps_between_looks(scene) < 3)
+    if (scene.accuracy.sleep_below > 0 && sleep_interval(scene) < 3)
         rules.warning("accuracy.sleep_below",
                       "nothing will sleep: in steps this long a P-wave crosses half a support; 0, or a smaller step");
 }
@@ -416,7 +416,7 @@ double crossing_time(const Scene& scene)
     return least;
 }
 double recommended_step(const Scene& scene) { return recommended_courant * crossing_time(scene); }
-std::int64_t steps_between_looks(const Scene& scene)
+std::int64_t sleep_interval(const Scene& scene)
 {
     // n steps after the look at everybody the first neighbours may have changed: n dt c_p <= 2 h
     const double courant = scene.time.step ? *scene.time.step / crossing_time(scene) : scene.accuracy.cfl;
@@ -478,7 +478,7 @@ void resolve(Scene& scene)
 
     note("sleep", scene.accuracy.sleep_below > 0,
          scene.accuracy.sleep_below > 0 ? text("soil slower than {:.3g} m/s among soil as slow keeps its state, looked at every {} steps",
-                                               scene.accuracy.sleep_below, steps_between_looks(scene))
+                                               scene.accuracy.sleep_below, sleep_interval(scene))
                                         : "accuracy.sleep_below = 0");
 
     if (const auto& d = effects.damping) note("damping", true, text("{:.6g} of critical until t = {:.6g} s", d->ratio, d->until));

@@ -20,7 +20,7 @@ double recommended_step(const Scene&);
 double stable_step(const Scene&);
 /// Every so many steps soil that may sleep (accuracy.sleep_below) is looked at: no sooner can a P-wave that was nowhere near a sleeper,
 /// not within its support, have reached it.
-std::int64_t steps_between_looks(const Scene&);
+std::int64_t sleep_interval(const Scene&);
 
 /// What a step above the stable limit is: an error, or a warning for --force-step.
 enum class StepLimit { Enforce, Force };

@@ -153,7 +153,7 @@ try:
     check("another scene" in mixed.stderr, "a checkpoint does not go on among the results of another scene")
     check(all(open(name, "rb").read() == data for name, data in before.items()), "they stay as they were")
     # ---- words that cannot be written
-    for words in (("check", scene), ("check", scene, "--json"), ("job", scene, "--machine", "slurm", "--nodes", "1"), ("reference",)):
+    for words in (("check", scene), ("check", scene, "--json"), ("job", scene, "--machine", "slurm", "--nodes", "1"), ("reference",), ("schema",)):
         with open("/dev/full", "w") as full:
             done = subprocess.run([program, *words], cwd=work, stdout=full, stderr=subprocess.PIPE, text=True)
         check(done.returncode == 4 and "defect" not in done.stderr, f"kuzure {words[0]} into a full disk is exit 4, found {done.returncode}")

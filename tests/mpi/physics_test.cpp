@@ -1,6 +1,6 @@
 // Whole runs against closed forms, on any number of ranks: free fall, walls, an elastic column, the energy ledger.
 #include "io/scene_file.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/simulation.hpp"
 #include "tests/mpi/world.hpp"
 #include <fmt/format.h>
 #include <gtest/gtest.h>

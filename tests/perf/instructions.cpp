@@ -1,11 +1,11 @@
 // Passes over a small jittered cloud, for counting instructions: instructions PASSES lanes|plain. Prints the directed pairs
 // of a pass. Compiled for x86-64-v3 whatever the machine, so that valgrind can run it and the count is the same everywhere.
 #include "perf/bench/cloud.hpp"
-#include "solver/kernels/pass_impl.hpp"
+#include "solver/kernels/leap_frog.hpp"
+#include "solver/scene/scene.hpp"
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <numeric>
 
 using namespace kuzure;
 
@@ -16,25 +16,19 @@ int main(int argc, char** argv)
     bench::Cloud cloud(14, 0.2);
     cloud.sort();
     using Bare = Model<CubicSpline, LinearViscosity>;
-    const auto run = [&](const auto& model) {
-        cloud.build(model.cluster_width(), 0.1);
-        Array<Record<double>> now, next;
-        cloud.make_records(now);
-        next.resize(now.size());
-        std::vector<Index> all(cloud.lists.size());
-        std::iota(all.begin(), all.end(), 0);
-        auto p = cloud.pass(now, next, 0);
-        p.kick = 0;
+    const auto run = [&](auto model) {
+        cloud.prepare(model, 0.1);
+        auto in = cloud.input(0);
         // One pass in five prunes the lists, as in a collapse.
-        p.margin = 0.026 * cloud.scene.support();
+        in.margin = 0.026 * cloud.scene.support();
         std::int64_t pairs = 0;
         for (int k = 0; k < passes; ++k) {
-            p.prune = k % 5 == 0;
-            pairs = model.run(p, all).pairs;
+            in.prune = k % 5 == 0;
+            pairs = cloud.step(model, in).pairs;
         }
         std::printf("%lld\n", static_cast<long long>(pairs));
     };
     const auto scene = bench::dry_sand().interactions();
-    if (std::strcmp(argv[2], "plain") == 0) run(Compiled<Bare, double>(scene));
-    else run(Compiled<Bare, Native<double>>(scene));
+    if (std::strcmp(argv[2], "plain") == 0) run(LeapFrog<Bare, double>(scene));
+    else run(LeapFrog<Bare, Native<double>>(scene));
 }

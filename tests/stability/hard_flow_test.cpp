@@ -20,7 +20,7 @@ template <class Depth> Contained contained(const SceneText& t, Depth depth, Vect
         if (s.steps() % 10) return;
         each(s, [&](Index i) { r.depth = std::max(r.depth, depth(position(s, i)) / t.spacing); });
     });
-    r.seen_by_guard = sim.structure().deepest;
+    r.seen_by_guard = sim.seen().deepest;
     r.outside = lost(sim, low, high);
     return r;
 }

@@ -1,7 +1,7 @@
-// Every fast pass against solver/physics/by_the_book.hpp: every compiled model, in 3-D and 2-D, plain, in lanes and in mixed precision,
+// Every fast pass against solver/kernels/by_the_book.hpp: every compiled model, in 3-D and 2-D, plain, in lanes and in mixed precision,
 // on lattice, jitter, disorder and hard arrangements, alone and beside walls of every shape and surface.
+#include "solver/kernels/by_the_book.hpp"
 #include "solver/kernels/variants.hpp"
-#include "solver/physics/by_the_book.hpp"
 #include "tests/unit/run_pass.hpp"
 #include <gtest/gtest.h>
 #include <numbers>
@@ -211,7 +211,7 @@ constexpr double sharp = 5e-12, sharp_diffusion = 5e-11, rough = 3e-5;
 void expect_by_the_book(const Cloud& c, const Read& read, const std::string& what)
 {
     for (const auto precision : {scene::Precision::Double, scene::Precision::Mixed})
-        for (const auto arithmetic : {Arithmetic::Plain, Arithmetic::Lanes}) {
+        for (const auto arithmetic : {Arithmetic::Scalar, Arithmetic::Simd}) {
             Cloud d = c;
             d.scene.accuracy.precision = precision;
             const auto pass = measured::run_pass(d, arithmetic, damping);
@@ -321,7 +321,7 @@ book::Shown mirrored_at_each_point(const book::Particle& i, const book::WallPoin
 }
 Difference off_from(const Cloud& c, const Read& read)
 {
-    return difference(c, measured::run_pass(c, Arithmetic::Lanes, damping), read.rates);
+    return difference(c, measured::run_pass(c, Arithmetic::Simd, damping), read.rates);
 }
 
 } // namespace
@@ -384,7 +384,7 @@ TEST(ByTheBook, NoticesAFaultInAnyComponentOfL)
     Scene s = everything(3);
     s.walls = {wall(3, 2, 3)};
     const Cloud c = cloud(Jitter, s);
-    const auto pass = measured::run_pass(c, Arithmetic::Lanes, damping);
+    const auto pass = measured::run_pass(c, Arithmetic::Simd, damping);
     const Read read = by_the_book(c);
     EXPECT_LT(difference(c, pass, read.rates).L, sharp);
     for (int component = 0; component < 10; ++component) {

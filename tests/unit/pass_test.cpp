@@ -1,37 +1,22 @@
 // What the pair pass promises besides the equations (by_the_book_test.cpp): the same bits in every width of lanes, whatever the
 // lists' skin and pruning, mixed precision near double, momentum kept.
 #include "perf/bench/cloud.hpp"
-#include "solver/kernels/pass_impl.hpp"
+#include "solver/kernels/leap_frog.hpp"
 #include "solver/kernels/variants.hpp"
 #include "solver/scene/scene.hpp"
 #include <gtest/gtest.h>
-#include <numeric>
 
 using namespace kuzure;
 using bench::Cloud;
 
 namespace {
 
-template <class T> PassResult run(const PairModel& model, Cloud& c, double skin, double dt, double kick)
+PassResult run(PairModel& model, Cloud& c, double skin, double dt, double kick)
 {
-    c.sort();
-    c.build(model.cluster_width(), skin);
-    Array<Record<T>> records, next;
-    c.make_records(records);
-    next.resize(records.size());
-    Array<Tension<T>> tension(records.size()), next_tension(records.size());
-    for (auto& t : tension) t = {};
-    const double epsilon = c.scene.effects.artificial_stress ? c.scene.effects.artificial_stress->epsilon : 0;
-    for (Index i = 0; i < c.particles.size(); ++i) tension[i] = make_tension<T>(c.particles[field::stress][i], epsilon);
-    auto p = c.pass(records, next, dt);
-    p.kick = kick;
-    const PoreWater water = PoreWater::from(c.scene.effects);
-    p.water = water.present() ? &water : nullptr;
-    for (const auto& m : c.soils) p.evolving = p.evolving || m.evolves();
-    p.tension = tension.data(), p.next_tension = next_tension.data();
-    std::vector<Index> all(c.lists.size());
-    std::iota(all.begin(), all.end(), 0);
-    return model.run(p, all);
+    c.prepare(model, skin);
+    StepInput in = c.input(dt);
+    in.kick = kick;
+    return c.step(model, in);
 }
 
 Scene with(scene::Kernel kernel, bool viscous, double beta, bool tensile, int dimensions = 3)
@@ -98,9 +83,9 @@ TEST(Pass, AnEffectOfStrengthZeroChangesNoBit)
         idle[5].effects.pore_pressure = scene::PorePressure{{{0.0, -1e3}}, 1000};
         for (std::size_t k = 0; k < idle.size(); ++k) {
             Cloud a = arrangement(1, bare), b = arrangement(1, idle[k]);
-            const auto plain = choose_model(bare, Arithmetic::Lanes), full = choose_model(idle[k], Arithmetic::Lanes);
-            run<double>(*plain, a, 0.1, 1e-4, 1e-4);
-            run<double>(*full, b, 0.1, 1e-4, 1e-4);
+            const auto plain = choose_model(bare, Arithmetic::Simd), full = choose_model(idle[k], Arithmetic::Simd);
+            run(*plain, a, 0.1, 1e-4, 1e-4);
+            run(*full, b, 0.1, 1e-4, 1e-4);
             for (Index i = 0; i < a.particles.size(); ++i) {
                 ASSERT_EQ(a.particles[field::stress][i], b.particles[field::stress][i]) << k << " " << full->name();
                 ASSERT_EQ(a.particles[field::half_velocity][i], b.particles[field::half_velocity][i]) << k << " " << full->name();
@@ -114,9 +99,9 @@ TEST(Pass, LanesGiveThePlainLoopsBits)
     for (const Scene& s : scenes())
         for (int kind = 0; kind < 4; ++kind) {
             Cloud plain = arrangement(kind, s), lanes = arrangement(kind, s);
-            const auto one = choose_model(s, Arithmetic::Plain), many = choose_model(s, Arithmetic::Lanes);
-            const auto a = run<double>(*one, plain, 0.1, 1e-4, 1e-4);
-            const auto b = run<double>(*many, lanes, 0.3, 1e-4, 1e-4);
+            const auto one = choose_model(s, Arithmetic::Scalar), many = choose_model(s, Arithmetic::Simd);
+            const auto a = run(*one, plain, 0.1, 1e-4, 1e-4);
+            const auto b = run(*many, lanes, 0.3, 1e-4, 1e-4);
             EXPECT_EQ(a.pairs, b.pairs);
             const bool same_division = std::string(instruction_set()).find("512") == std::string::npos;
             for (Index i = 0; i < plain.particles.size(); ++i) {
@@ -133,13 +118,13 @@ TEST(Pass, AnyWidthOfLanesAndAnySkinGivesTheSameBits)
 {
     const Scene s = bench::dry_sand();
     using M = Model<CubicSpline, LinearViscosity, NoArtificialStress>;
-    const Compiled<M, Simd<double, 2>> two(s.interactions());
-    const Compiled<M, Simd<double, 4>> four(s.interactions());
-    const Compiled<M, Simd<double, 16>> sixteen(s.interactions());
+    LeapFrog<M, Simd<double, 2>> two(s.interactions());
+    LeapFrog<M, Simd<double, 4>> four(s.interactions());
+    LeapFrog<M, Simd<double, 16>> sixteen(s.interactions());
     Cloud a = arrangement(2, s), b = arrangement(2, s), c = arrangement(2, s);
-    run<double>(two, a, 0.02, 1e-4, 1e-4);
-    run<double>(four, b, 0.2, 1e-4, 1e-4);
-    run<double>(sixteen, c, 0.5, 1e-4, 1e-4);
+    run(two, a, 0.02, 1e-4, 1e-4);
+    run(four, b, 0.2, 1e-4, 1e-4);
+    run(sixteen, c, 0.5, 1e-4, 1e-4);
     const bool same_division = std::string(instruction_set()).find("512") == std::string::npos;
     if (!same_division) return;
     for (Index i = 0; i < a.particles.size(); ++i) {
@@ -150,25 +135,16 @@ TEST(Pass, AnyWidthOfLanesAndAnySkinGivesTheSameBits)
 
 /// A pass after all particles have moved by `way` in all directions since their lists were pruned with a margin; without a
 /// margin the lists are pruned when they have moved.
-template <class T> std::pair<PassResult, Particles> moved_since_pruned(const Scene& s, double way, std::optional<double> margin)
+std::pair<PassResult, Particles> moved_since_pruned(const Scene& s, double way, std::optional<double> margin)
 {
-    const auto model = choose_model(s, Arithmetic::Lanes);
+    const auto model = choose_model(s, Arithmetic::Simd);
     Cloud c = arrangement(1, s);
-    c.sort();
-    c.build(model->cluster_width(), 0.4);
+    c.prepare(*model, 0.4);
     const Particles start = c.particles;
-    Array<Record<T>> records, next;
-    c.make_records(records);
-    next.resize(records.size());
-    Array<Tension<T>> tension(records.size()), next_tension(records.size());
-    for (auto& t : tension) t = {};
-    auto p = c.pass(records, next, 1e-4);
-    p.tension = tension.data(), p.next_tension = next_tension.data();
-    std::vector<Index> all(c.lists.size());
-    std::iota(all.begin(), all.end(), 0);
+    StepInput in = c.input(1e-4);
     if (margin) {
-        p.margin = *margin;
-        model->run(p, all);
+        in.margin = *margin;
+        c.step(*model, in);
     }
     c.particles = start;
     std::mt19937_64 g(3);
@@ -177,29 +153,29 @@ template <class T> std::pair<PassResult, Particles> moved_since_pruned(const Sce
         const Vector d{n(g), s.dimensions == 2 ? 0 : n(g), n(g)};
         c.particles[field::position].set(i, c.particles[field::position][i] + (way / length(d)) * d);
     }
-    c.make_records(records);
-    p.prune = !margin, p.margin = 0;
-    const auto result = model->run(p, all);
+    model->make_records(c.particles, c.soils, {});
+    in.prune = !margin, in.margin = 0;
+    const auto result = c.step(*model, in);
     return {result, c.particles};
 }
-template <class T> void expect_margin_holds(Scene s)
+void expect_margin_holds(Scene s)
 {
     const double m = 0.06 * s.support();
-    const auto exact = moved_since_pruned<T>(s, 0.49 * m, {}), early = moved_since_pruned<T>(s, 0.49 * m, m);
+    const auto exact = moved_since_pruned(s, 0.49 * m, {}), early = moved_since_pruned(s, 0.49 * m, m);
     EXPECT_EQ(exact.first.pairs, early.first.pairs);
     for (Index i = 0; i < exact.second.size(); ++i) {
         ASSERT_EQ(exact.second[field::stress][i], early.second[field::stress][i]) << i;
         ASSERT_EQ(exact.second[field::velocity][i], early.second[field::velocity][i]) << i;
     }
     // Beyond the margin pairs are missed: the test can fail.
-    EXPECT_GT(moved_since_pruned<T>(s, 3 * m, {}).first.pairs, moved_since_pruned<T>(s, 3 * m, m).first.pairs);
+    EXPECT_GT(moved_since_pruned(s, 3 * m, {}).first.pairs, moved_since_pruned(s, 3 * m, m).first.pairs);
 }
 TEST(Pass, ListsPrunedWithAMarginHoldWhatComesIntoReach)
 {
     for (Scene s : scenes()) {
-        expect_margin_holds<double>(s);
+        expect_margin_holds(s);
         s.accuracy.precision = scene::Precision::Mixed;
-        expect_margin_holds<float>(s);
+        expect_margin_holds(s);
     }
 }
 
@@ -208,13 +184,13 @@ TEST(Pass, MixedPrecisionStaysNearDouble)
     for (const Scene& base : scenes()) {
         Scene s = base;
         Cloud exact = arrangement(1, s);
-        const auto full = choose_model(s, Arithmetic::Lanes);
+        const auto full = choose_model(s, Arithmetic::Simd);
         const Cloud before = exact;
-        run<double>(*full, exact, 0.1, 1e-4, 1e-4);
+        run(*full, exact, 0.1, 1e-4, 1e-4);
         s.accuracy.precision = scene::Precision::Mixed;
         Cloud rough = arrangement(1, s);
-        const auto mixed = choose_model(s, Arithmetic::Lanes);
-        run<float>(*mixed, rough, 0.1, 1e-4, 1e-4);
+        const auto mixed = choose_model(s, Arithmetic::Simd);
+        run(*mixed, rough, 0.1, 1e-4, 1e-4);
         double worst = 0, largest = 0;
         for (Index i = 0; i < exact.particles.size(); ++i) {
             const auto a = exact.particles[field::half_velocity][i], b = rough.particles[field::half_velocity][i];
@@ -237,11 +213,11 @@ TEST(Pass, MomentumIsKeptToRoundOff)
         Vector change{};
         c.sort();
         Cloud after = c;
-        run<double>(*choose_model(s, Arithmetic::Lanes), after, 0.1, 0, 1e-4);
+        run(*choose_model(s, Arithmetic::Simd), after, 0.1, 0, 1e-4);
         for (Index i = 0; i < c.particles.size(); ++i) {
             const double m = c.soils[0].density * s.particle_volume();
             // m dv of the stored density: rho_i V_i = m
-            const Vector dv = after.particles[field::half_velocity][i] - c.particles[field::half_velocity][i];
+            const Vector dv = after.particles[field::half_velocity][i] - c.particles[field::velocity][i];
             change = change + m * dv;
             scale += m * length(dv);
         }

@@ -1,6 +1,6 @@
 #pragma once
 // What a fast pass makes of a cloud, measured from outside: acceleration, all of L, stress diffusion, powers. All that knows
-// records, lists and the members of a pass is here.
+// what a model is asked, and how its scheme advances, is here.
 //
 // The half-step values are the pass's to advance, and no force depends on them: they are set such that their change is sharp.
 // - half_velocity = 0 and a kick of 2^-60 s: it becomes kick a, exactly.
@@ -33,21 +33,15 @@ struct Rates {
 namespace detail {
 
 /// One compiled model over one sorted cloud.
-template <class T> class Passes {
+class Passes {
 public:
-    Passes(bench::Cloud cloud, Arithmetic arithmetic, double damping)
-        : cloud_(std::move(cloud)), model_(choose_model(cloud_.scene, arithmetic)), water_(PoreWater::from(cloud_.scene.effects)),
-          damping_(damping)
+    Passes(const bench::Cloud& cloud, Arithmetic arithmetic, double damping)
+        : cloud_(cloud), model_(choose_model(cloud.scene, arithmetic)), damping_(damping)
     {
-        cloud_.build(model_->cluster_width(), 0.1);
+        cloud_.prepare(*model_, 0.1);
         start_ = cloud_.particles;
-        cloud_.make_records(records_);
-        next_.resize(records_.size()), tension_.resize(records_.size()), next_tension_.resize(records_.size());
-        for (auto& t : tension_) t = {};
-        const auto& artificial = cloud_.scene.effects.artificial_stress;
-        for (Index i = 0; i < size(); ++i) tension_[i] = make_tension<T>(start_[field::stress][i], artificial ? artificial->epsilon : 0);
-        walls_ = cloud_.template wall_records<T>();
     }
+    Passes(const Passes&) = delete; // the model reads the cloud's walls
     Index size() const { return start_.size(); }
     std::string name() const { return model_->name(); }
     const Particles& start() const { return start_; }
@@ -66,14 +60,12 @@ public:
             power = std::max(power, std::sqrt(contract(s, s)) * length(start_[field::velocity][i]));
         }
         power *= cloud_.scene.particle_volume() / cloud_.scene.smoothing_length();
-        auto pass = cloud_.pass(records_, next_, 0);
-        pass.kick = seconds, pass.energy_unit = seconds * power * 0x1p-44; // as fine as their sums allow
-        pass.tension = tension_.data(), pass.next_tension = next_tension_.data();
-        pass.walls = walls_, pass.water = water_.present() ? &water_ : nullptr;
-        pass.forces.damping = damping_;
+        StepInput in = cloud_.input(0);
+        in.kick = seconds, in.energy_unit = seconds * power * 0x1p-44; // as fine as their sums allow
+        in.forces.damping = damping_;
         std::vector<Group> groups;
         for (Index c = 0; c < cloud_.lists.size(); ++c) {
-            const PassResult r = model_->run(pass, std::array{c});
+            const PassResult r = model_->run(0, in, std::array{c});
             groups.push_back({cloud_.lists.first(c), cloud_.lists.count(c), r.pairs, r.energy.wall / seconds, r.energy.viscous / seconds,
                               r.energy.damping / seconds});
         }
@@ -83,12 +75,8 @@ public:
 private:
     bench::Cloud cloud_;
     std::unique_ptr<PairModel> model_;
-    PoreWater water_;
     double damping_;
     Particles start_;
-    Array<Record<T>> records_, next_;
-    Array<Tension<T>> tension_, next_tension_;
-    std::vector<WallRecords<T>> walls_;
 };
 
 /// Strain of an elastic stress.
@@ -112,11 +100,11 @@ inline Vector half_spin_between(const Stress& S, const Stress& A)
     return w;
 }
 
-template <class T> Rates run_pass(const bench::Cloud& cloud, Arithmetic arithmetic, double damping)
+inline Rates run_pass(const bench::Cloud& cloud, Arithmetic arithmetic, double damping)
 {
     bench::Cloud strong = cloud;
     for (auto& m : strong.soils) m.k = m.residual_k = 1e12, m.apex = m.cutoff = std::numeric_limits<double>::infinity();
-    Passes<T> passes(strong, arithmetic, damping);
+    Passes passes(strong, arithmetic, damping);
     const Index n = passes.size();
     const auto material = [&](Index i) -> const Material& { return strong.soils[passes.start()[field::soil][i]]; };
 
@@ -132,7 +120,7 @@ template <class T> Rates run_pass(const bench::Cloud& cloud, Arithmetic arithmet
     of.diffusion.resize(n);
     if (auto& d = strong.scene.effects.stress_diffusion) {
         d->zeta = 0;
-        Passes<T> undiffused(strong, arithmetic, damping);
+        Passes undiffused(strong, arithmetic, damping);
         undiffused.kick(brief, {});
         for (Index i = 0; i < n; ++i) {
             const Stress by_strain = (1 / brief) * undiffused.now()[field::half_stress][i];
@@ -167,8 +155,7 @@ inline Rates run_pass(const bench::Cloud& sorted, Arithmetic arithmetic, double 
 {
     const int threads = omp_get_max_threads();
     omp_set_num_threads(1); // one cluster at a time is too little for a team
-    const bool mixed = sorted.scene.accuracy.precision == scene::Precision::Mixed;
-    Rates of = mixed ? detail::run_pass<float>(sorted, arithmetic, damping) : detail::run_pass<double>(sorted, arithmetic, damping);
+    Rates of = detail::run_pass(sorted, arithmetic, damping);
     omp_set_num_threads(threads);
     return of;
 }

@@ -411,6 +411,71 @@ TEST(SceneKeys, EveryExampleAndDefaultIsLegal)
     }
 }
 
+TEST(SceneKeys, EveryKeySaysWhatItIs)
+{
+    std::set<std::string> paths;
+    for (const auto& key : io::scene_keys()) {
+        EXPECT_TRUE(paths.insert(key.path).second) << key.path << " twice";
+        EXPECT_FALSE(key.example.empty() || key.doc.empty()) << key.path;
+        EXPECT_EQ(key.need == io::Need::Default, !key.fallback.empty()) << key.path;
+    }
+    EXPECT_EQ(io::scene_keys().find("output.picture.view")->role, io::Role::Bookkeeping); // its section's
+    EXPECT_EQ(io::scene_keys().find("accuracy.kernel")->role, io::Role::Physics);
+}
+
+TEST(SceneKeys, EveryWordOfAChoiceIsWrittenAsItWasRead)
+{
+    int words = 0;
+    for (const auto& key : io::scene_keys()) {
+        if (key.kind != io::Kind::Choice && key.kind != io::Kind::ChoiceOrTable) continue;
+        auto path = key.path;
+        if (const auto star = path.find('*'); star != path.npos) path.replace(star, 1, path.starts_with("soil") ? "sand" : "0");
+        std::set<std::string> hashes;
+        for (const auto& word : key.choices) {
+            const auto scene = parsed(full, {path + "=" + word, "soil.sand.dilation_angle=0"});
+            EXPECT_THAT(io::write_scene(scene), HasSubstr(fmt::format("{} = \"{}\"", key.leaf(), word))) << path;
+            if (path.starts_with("accuracy.") && path != "accuracy.preset") hashes.insert(io::scene_hash(scene));
+            ++words;
+        }
+        EXPECT_TRUE(hashes.empty() || hashes.size() == key.choices.size()) << path << ": two words, one meaning";
+    }
+    EXPECT_GT(words, 20);
+}
+
+TEST(SceneKeys, WordsMeanTheirValues)
+{
+    const auto with = [](const char* set) { return parsed(full, {set, "soil.sand.dilation_angle=0"}); };
+    EXPECT_EQ(with("soil.sand.cone=compression").soils[0].cone, scene::Cone::Compression);
+    EXPECT_EQ(with("soil.sand.cone=extension").soils[0].cone, scene::Cone::Extension);
+    EXPECT_EQ(with("soil.sand.cone=plane strain").soils[0].cone, scene::Cone::PlaneStrain);
+    EXPECT_EQ(with("accuracy.kernel=cubic spline").accuracy.kernel, scene::Kernel::CubicSpline);
+    EXPECT_EQ(with("accuracy.precision=double").accuracy.precision, scene::Precision::Double);
+    EXPECT_EQ(with("accuracy.correction=gradient").accuracy.correction, scene::Correction::Gradient);
+    EXPECT_EQ(with("wall.0.surface=smooth").walls[0].surface, scene::Surface::Smooth);
+    EXPECT_EQ(with("output.picture.view=cut").output.picture->view, scene::View::Cut);
+    EXPECT_EQ(with("output.picture.color=pressure").output.picture->color, scene::Color::Pressure);
+    for (const auto& preset : io::presets()) EXPECT_EQ(with(("accuracy.preset=" + preset.name).c_str()).accuracy.preset, preset.value);
+}
+
+TEST(SceneKeys, DefaultsOfFilesAreThoseOfTheStructs)
+{
+    const auto s = parsed(least, {"effects.artificial_stress={}", "effects.stress_diffusion={}", "output.picture={}"});
+    EXPECT_EQ(s.accuracy, scene::Accuracy{});
+    EXPECT_EQ(s.space.h, scene::Space{}.h);
+    EXPECT_EQ(s.time.retry, scene::Time{}.retry);
+    EXPECT_EQ(s.effects.artificial_stress, scene::ArtificialStress{});
+    EXPECT_EQ(s.effects.stress_diffusion, scene::StressDiffusion{});
+    scene::Output output;
+    output.picture.emplace();
+    EXPECT_EQ(s.output, output);
+    const scene::Soil soil{};
+    EXPECT_EQ(s.soils[0].cohesion, soil.cohesion);
+    EXPECT_EQ(s.soils[0].dilation_angle, soil.dilation_angle);
+    EXPECT_EQ(s.soils[0].cone, soil.cone);
+    EXPECT_EQ(s.bodies[0].velocity, scene::Body{}.velocity);
+    EXPECT_EQ(s.bodies[0].stress, scene::Body{}.stress);
+}
+
 TEST(SceneKeys, NearestWordIsFound)
 {
     EXPECT_EQ(io::edit_distance("kernel", "kernel"), 0);

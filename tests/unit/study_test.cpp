@@ -91,7 +91,8 @@ TEST(Sweep, PointsStartFromTheBaseAndOwnPresetsFromThoseOfKuzure)
 TEST(Sweep, BadOnesAreRefusedWithFileLineKeyAndRemedy)
 {
     EXPECT_THAT(message("scene = \"a.toml\"\nmeasures = [\"run-out\"\n"), HasSubstr("dir/sweep.toml:"));
-    EXPECT_THAT(message("measures = [\"run-out\"]\n" + grid), HasSubstr("scene: expected a path"));
+    EXPECT_THAT(message("measures = [\"run-out\"]\n" + grid),
+                HasSubstr("scene: expected a string, found nothing; write, for example, scene = \"column.toml\""));
     EXPECT_THAT(message("scene = \"a.toml\"\n" + grid), HasSubstr("measures: expected an array"));
     EXPECT_THAT(message("scene = \"a.toml\"\nmeasures = [\"runout\"]\n" + grid), HasSubstr("did you mean \"run-out\""));
     EXPECT_THAT(message("scene = \"a.toml\"\nmeasures = [\"run-out\", \"run-out\"]\n" + grid), HasSubstr("twice"));
@@ -104,13 +105,27 @@ TEST(Sweep, BadOnesAreRefusedWithFileLineKeyAndRemedy)
     EXPECT_THAT(message(least_sweep + "[vary]\n\"space.spacing\" = [0.1, 0.1]\n"), HasSubstr("each value once"));
     EXPECT_THAT(message(least_sweep + "[vary]\npreset = [\"sead\"]\n"), HasSubstr("did you mean \"seed\""));
     EXPECT_THAT(message(least_sweep + grid + "[presets.fast]\n\"space.h\" = 1.5\n"), HasSubstr("a name of your own"));
-    EXPECT_THAT(message(least_sweep + "[[point]]\n\"accuracy.cfl\" = 0.1\n"), HasSubstr("expected a name"));
+    EXPECT_THAT(message(least_sweep + "[[point]]\n\"accuracy.cfl\" = 0.1\n"),
+                HasSubstr("sweep.toml:3: point.0.name: expected a string, found nothing"));
     EXPECT_THAT(message(least_sweep + "[[point]]\nname = \"a\"\n"), HasSubstr("expected a setting"));
     EXPECT_THAT(message(least_sweep + "[[point]]\nname = \"base\"\n\"accuracy.cfl\" = 0.1\n"), HasSubstr("a name of its own"));
     EXPECT_THAT(message(least_sweep + "[reference]\nfinest = true\nclosed_form = \"k0 column\"\n" + grid), HasSubstr("exactly one"));
     EXPECT_THAT(message(least_sweep + "[reference]\nclosed_form = \"k1 column\"\n" + grid), HasSubstr("k0 column"));
     EXPECT_THAT(message("scene = \"a.toml\"\nmeasures = [\"stress\"]\n" + grid), HasSubstr("needs closed_form"));
-    EXPECT_THAT(message(least_sweep + "threads = 0\n" + grid), HasSubstr("from 1 to 4096"));
+    EXPECT_THAT(message(least_sweep + "threads = 0\n" + grid),
+                HasSubstr("sweep.toml:3: threads: expected an integer, 1 <= x <= 4096, found 0"));
+    EXPECT_THAT(message(least_sweep + "[reference]\nfinest = false\n" + grid),
+                HasSubstr("reference.finest: expected a string or true, found false"));
+    EXPECT_THAT(message(least_sweep + "[reference]\nprofile = \"a.csv\"\nscater = 0.1\n" + grid), HasSubstr("did you mean \"scatter\""));
+    EXPECT_THAT(message(least_sweep + "base = 3\n" + grid), HasSubstr("base: expected a table, found 3"));
+    EXPECT_THAT(message(least_sweep + "point = 3\n"), HasSubstr("point: expected tables [[point]], found 3"));
+    EXPECT_THAT(message(least_sweep + "presets = { a = 3 }\n" + grid), HasSubstr("presets.a: expected a table"));
+    EXPECT_THAT(message(least_sweep + "[[point]]\nname = \"\"\n\"accuracy.cfl\" = 0.1\n"), HasSubstr("point.name: expected words"));
+    // As for scenes: everything that is wrong at once, and what kind of file this should be.
+    const auto both = message("scene = 3\nmeasures = [\"run-out\"]\ngrain = -1\n" + grid);
+    EXPECT_THAT(both, HasSubstr("sweep.toml:1: scene: expected a string, found 3"));
+    EXPECT_THAT(both, HasSubstr("sweep.toml:3: grain: expected a number in m, 1e-09 <= x <= 1e+09, found -1"));
+    EXPECT_THAT(message(std::string(1 << 20, ' ') + least_sweep), HasSubstr("expected a sweep of at most 1 MiB"));
     std::string wide = least_sweep + "[vary]\n";
     for (const char* key : {"space.h", "space.spacing", "accuracy.cfl"}) {
         wide += fmt::format("\"{}\" = [1", key);

@@ -1,5 +1,5 @@
-// Artificial stress from principal stresses (terms.cpp): against stresses whose axes are known, and where rotations end in nothing.
-#include "solver/physics/terms.hpp"
+// Artificial stress from principal stresses (effects/artificial_stress.cpp): against stresses whose axes are known, and where rotations end in nothing.
+#include "solver/effects/artificial_stress.hpp"
 #include <cfenv>
 #include <cmath>
 #include <gtest/gtest.h>

@@ -69,6 +69,6 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
                         << name << ", step " << sim.steps();
                     ASSERT_GT(expected, 1000) << name;
                 }
-                EXPECT_GT(sim.structure().rebuilds, 3) << name;
+                EXPECT_GT(sim.rebuilds(), 3) << name;
             }
 }

@@ -75,7 +75,7 @@ TEST(Sleep, NoSleeperIsMissedByAWave)
 {
     // Whoever sleeps at a look was calm with calm neighbours: until the next look no particle may have come to move fast.
     Simulation sim(Comm::world(), struck_ground(slow).scene());
-    const auto every = scene::steps_between_looks(sim.scene());
+    const auto every = scene::sleep_interval(sim.scene());
     ASSERT_GT(every, 3);
     double fastest = 0;
     std::int64_t sleepers = 0;

@@ -5,7 +5,7 @@
 #include "solver/app/forecast.hpp"
 #include "solver/app/predict.hpp"
 #include "solver/app/study/dial.hpp"
-#include "solver/kernels/step.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include "solver/scene/numbers.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -20,7 +20,7 @@ Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy
 {
     const double wanted = study::parse_accuracy(accuracy);
     use_threads(comm, 0);
-    const auto estimate_of = [](const scene::Ready& r) { return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Lanes)); };
+    const auto estimate_of = [](const scene::Ready& r) { return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd)); };
     // Counted, not timed, so that the same is proposed at every call; mixed precision took 0.76 of the time (docs/performance.md).
     const auto work = [&](const scene::Ready& r) {
         const Estimate e = estimate_of(r);
@@ -41,12 +41,16 @@ std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
 
 void add_reference(CLI::App& app, Action& chosen)
 {
-    app.add_subcommand("reference", "every key of a scene, as Markdown (docs/scene.md)")->callback([&chosen] {
-        chosen = [](const Comm& comm) {
-            if (comm.rank() == 0) fmt::print("{}", io::scene_reference());
-            return Exit::Ok;
-        };
-    });
+    const auto add = [&](const char* name, const char* about, std::string (*text)()) {
+        app.add_subcommand(name, about)->callback([&chosen, text] {
+            chosen = [text](const Comm& comm) {
+                if (comm.rank() == 0) fmt::print("{}", text());
+                return Exit::Ok;
+            };
+        });
+    };
+    add("reference", "every key of a scene, as Markdown (docs/scene.md)", io::scene_reference);
+    add("schema", "every key of a scene, as a JSON Schema by which editors complete and check scenes", io::scene_schema);
 }
 
 void add_check(CLI::App& app, Action& chosen)
@@ -71,7 +75,7 @@ void add_check(CLI::App& app, Action& chosen)
         chosen = [=](const Comm& comm) {
             const auto [s, doubts, filling] = args->read(comm);
             if (!accuracy->empty()) return turn_the_dial(comm, s, *accuracy, *json);
-            const auto model = choose_model(s, Arithmetic::Lanes);
+            const auto model = choose_model(s, Arithmetic::Simd);
             const Estimate e = estimate(s, filling, *model);
             const double memory = e.memory + bytes_per_process * comm.size();
             Forecast time;

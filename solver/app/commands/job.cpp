@@ -2,7 +2,7 @@
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
 #include "solver/app/predict.hpp"
-#include "solver/kernels/step.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <fmt/format.h>
@@ -140,7 +140,7 @@ Plan make_plan(const Comm& comm, const Arguments& a)
                                    m.file.string()));
     choose_mode_and_queue(p, a);
 
-    p.estimate = estimate(scene, filling, *choose_model(scene, Arithmetic::Lanes));
+    p.estimate = estimate(scene, filling, *choose_model(scene, Arithmetic::Simd));
     const Estimate& e = p.estimate;
     p.memory = e.memory / p.nodes + bytes_per_process * p.per_node;
     const double has = p.mode && p.mode->memory ? *p.mode->memory : m.node.memory;

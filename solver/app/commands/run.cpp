@@ -13,7 +13,8 @@
 #include "solver/app/measure.hpp"
 #include "solver/app/report/movie.hpp"
 #include "solver/app/report/report.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/simulation.hpp"
+#include "solver/app/clock_text.hpp"
 #include "solver/app/status.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/core/simd.hpp"
@@ -44,45 +45,6 @@ volatile std::sig_atomic_t asked_to_stop = 0;
 void on_signal(int) { asked_to_stop = 1; }
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-std::string header_text(const Simulation& sim)
-{
-    const Clock c = sim.clock();
-    const auto& e = c.extremes;
-    const auto& d = c.dissipated;
-    return nlohmann::ordered_json{{"time", c.time},
-                                  {"step", c.step},
-                                  {"dt", c.dt},
-                                  {"extremes", {e.acceleration2, e.signal, e.moved2, e.speed2}},
-                                  {"pairs", c.pairs},
-                                  {"dissipated", {d.plastic, d.viscous, d.wall, d.damping}},
-                                  {"energy_at_start", c.energy_at_start},
-                                  {"energy_unit", c.energy_unit},
-                                  {"stepping", {c.step_scale, c.base_time}},
-                                  {"steps_from", {c.base_step, c.inspected}},
-                                  {"model", sim.model().name()},
-                                  {"version", version_text()}}
-        .dump();
-}
-
-Clock clock_from(const std::string& header, const io::Path& file)
-{
-    try {
-        const auto j = nlohmann::json::parse(header);
-        Clock c;
-        c.time = j.at("time"), c.step = j.at("step"), c.dt = j.at("dt"), c.pairs = j.at("pairs");
-        const auto& e = j.at("extremes");
-        c.extremes.acceleration2 = e.at(0), c.extremes.signal = e.at(1), c.extremes.moved2 = e.at(2), c.extremes.speed2 = e.at(3);
-        const auto& d = j.at("dissipated");
-        c.dissipated = {d.at(0), d.at(1), d.at(2), d.at(3)};
-        c.energy_at_start = j.at("energy_at_start"), c.energy_unit = j.at("energy_unit");
-        c.step_scale = j.at("stepping").at(0), c.base_time = j.at("stepping").at(1);
-        c.base_step = j.at("steps_from").at(0), c.inspected = j.at("steps_from").at(1);
-        return c;
-    } catch (const nlohmann::json::exception& e) {
-        throw IoFailed(fmt::format("{}: the clock of this checkpoint cannot be read ({})", file.string(), e.what()));
-    }
-}
 
 /// This rank's even share of all wall particles, for snapshots and pictures.
 io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::vector<Material>& soils)
@@ -184,8 +146,8 @@ private:
             require_same_scene(comm_, *from, scene_);
             if (!here) require_room_for(*from, where);
         }
-        RunOptions options{args_.plain ? Arithmetic::Plain : Arithmetic::Lanes, args_.recut_every};
-        const double done = from ? std::clamp(clock_from(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
+        RunOptions options{args_.plain ? Arithmetic::Scalar : Arithmetic::Simd, args_.recut_every};
+        const double done = from ? std::clamp(clock_from_text(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
         const Estimate e = estimate(scene_, *filling_, *choose_model(scene_, options.arithmetic));
         fits_or_throw(e, where, done);
         forecast_ = forecast(comm_, scene_, *filling_, e, done);
@@ -194,7 +156,7 @@ private:
         if (from) {
             Particles p;
             io::read_checkpoint(comm_, from->file, p);
-            const Clock clock = clock_from(from->header, from->file);
+            const Clock clock = clock_from_text(from->header, from->file);
             restart_time = clock.time;
             dir_.emplace(comm_, where, io::Existing::GoOn);
             checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
@@ -287,7 +249,7 @@ private:
         const double rate = wall > logged_wall_ ? double(sim_->steps() - logged_step_) / (wall - logged_wall_) : 0;
         if (!progress_->last_time() || sim_->time() > *progress_->last_time())
             progress_->append({sim_->time(), sim_->steps(), sim_->dt(), wall, sim_->steps() > logged_step_ ? rate : std::nan(""),
-                               sim_->structure().imbalance});
+                               sim_->balance().imbalance()});
         logged_wall_ = wall, logged_step_ = sim_->steps();
     }
 
@@ -334,7 +296,7 @@ private:
             snapshots_->write(p, walls_, {sim_->time(), sim_->steps(), scene_.dimensions, scene_.title, scene_.output.fields});
         double at[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
         for (Index i = 0; i < p.size(); ++i)
-            if (p[field::id][i] == sim_->blamed())
+            if (p[field::id][i] == sim_->failed_id())
                 for (int c = 0; c < 3; ++c) at[c] = p[field::position].column[c][i];
         comm_.max(std::span<double>(at));
         const auto& start = sim_->filling().soil_bounds();
@@ -350,7 +312,7 @@ private:
     {
         sim_->timers().timed(Phase::Checkpoint, [&] {
             history_->sync();
-            checkpoint_ = io::write_checkpoint(comm_, dir_->path(), sim_->particles(), hash_, header_text(*sim_));
+            checkpoint_ = io::write_checkpoint(comm_, dir_->path(), sim_->particles(), hash_, clock_text(*sim_));
         });
         last_checkpoint_ = now();
     }
@@ -382,11 +344,11 @@ private:
         const std::int64_t memory = comm_.max(std::int64_t(sim_->memory_bytes()));
         auto j = io::to_json(s);
         j["memory_bytes_per_rank"] = memory;
-        j["rebuilds"] = sim_->structure().rebuilds;
-        j["repartitions"] = sim_->structure().cuts;
-        j["repartitions_by_metis"] = sim_->structure().whole_cuts;
+        j["rebuilds"] = sim_->rebuilds();
+        j["repartitions"] = sim_->balance().cuts();
+        j["repartitions_by_metis"] = sim_->balance().full_partitions();
         j["pair_model"] = sim_->model().name();
-        const auto& seen = sim_->structure();
+        const auto& seen = sim_->seen();
         j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
         j["retries"] = retries_;
         j["peak_speed"] = peak_speed_;
@@ -435,9 +397,9 @@ private:
         say(fmt::format("results in {}, to begin with report.html", dir_->path().string()));
     }
 
-    Wishes wishes()
+    Requests wishes()
     {
-        Wishes w;
+        Requests w;
         const double t = now();
         w.stop = asked_to_stop != 0 || (args_.max_minutes > 0 && t - start_ > 60 * args_.max_minutes);
         if (comm_.rank() == 0) {
@@ -453,9 +415,9 @@ private:
     }
 
     /// One step; where it fails and the scene allows it, back and on with half the step.
-    Wishes advance()
+    Requests advance()
     {
-        const Wishes mine = wishes();
+        const Requests mine = wishes();
         try {
             return sim_->step(mine);
         } catch (const NumbersFailed& e) {
@@ -480,7 +442,7 @@ private:
         const auto look = [&](bool final) {
             if (!status_->due(final)) return;
             status_->show({sim.time(), sim.steps(), sim.dt(), sim.max_speed(), residual_, heap_, scene_.dimensions, comm_.size(),
-                           sim.structure().imbalance},
+                           sim.balance().imbalance()},
                           final);
         };
         first_step_ = logged_step_ = sim.steps();
@@ -491,7 +453,7 @@ private:
             outputs(sim.steps() == 0 ? -1 : sim.time(), sim.finished());
             while (!sim.finished()) {
                 const double before = sim.time();
-                const Wishes w = advance();
+                const Requests w = advance();
                 loop_seconds_ = now() - begin;
                 peak_speed_ = std::max(peak_speed_, sim.max_speed());
                 outputs(before, sim.finished());

@@ -4,7 +4,7 @@
 #include "solver/app/command.hpp"
 #include "solver/app/drift.hpp"
 #include "solver/app/predict.hpp"
-#include "solver/app/simulation.hpp"
+#include "solver/run/simulation.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -173,7 +173,7 @@ Exit scale(const Comm& comm, const Arguments& a)
     use_threads(comm, 0);
     const auto [s, doubts, filling] = a.scene.read(comm);
     io::MachineProfile machine = machine_named(a.machine);
-    const auto model = choose_model(s, Arithmetic::Lanes);
+    const auto model = choose_model(s, Arithmetic::Simd);
     const double bytes = double(row_bytes(*model)), reach = list_reach(s);
     const Estimate e = estimate(s, filling, *model);
     const auto state = a.from.empty() ? State() : state_of(comm, s, a.from);

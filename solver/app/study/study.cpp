@@ -142,7 +142,7 @@ Study plan(const io::Sweep& sweep)
             Scene s = io::parse_scene(text, sweep.scene.string(), asked.sets);
             p.spacing = s.space.spacing;
             const scene::Filling filling(s);
-            p.predicted_pairs = estimate(s, filling, *choose_model(s, Arithmetic::Lanes)).pairs;
+            p.predicted_pairs = estimate(s, filling, *choose_model(s, Arithmetic::Simd)).pairs;
             for (const auto& n : scene::judge(s, filling)) {
                 if (n.name == "base_strain") p.base_strain = n.value;
                 if (n.name == "mach") p.mach = n.value;

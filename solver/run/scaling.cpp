@@ -1,4 +1,4 @@
-#include "solver/app/scaling.hpp"
+#include "solver/run/scaling.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "solver/physics/terms.hpp"
+#include "solver/effects/artificial_stress.hpp"
 #include <algorithm>
 
 namespace kuzure {
@@ -44,20 +44,13 @@ Stress tension(const Stress& s, double epsilon)
     return tau;
 }
 
-PoreWater::Pressure PoreWater::at(Vector x) const
+template <class T> Tension<T> make_tension(const Stress& s, double epsilon)
 {
-    if (table.empty()) return {};
-    double z = table.front()[1], slope = 0;
-    if (x.x >= table.back()[0]) z = table.back()[1];
-    else
-        for (std::size_t k = 0; k + 1 < table.size(); ++k) {
-            const auto &a = table[k], &b = table[k + 1];
-            if (x.x < a[0] || x.x >= b[0]) continue;
-            slope = (b[1] - a[1]) / (b[0] - a[0]);
-            z = a[1] + slope * (x.x - a[0]);
-        }
-    if (x.z >= z) return {};
-    return {unit_weight * (z - x.z), {unit_weight * slope, 0, -unit_weight}};
+    const Stress t = tension(s, epsilon);
+    const bool any = t != Stress{};
+    return {T(t.xx), T(t.yy), T(t.zz), T(t.xy), T(t.yz), T(t.xz), T(any), T(0)};
 }
+template Tension<double> make_tension(const Stress&, double);
+template Tension<float> make_tension(const Stress&, double);
 
 } // namespace kuzure

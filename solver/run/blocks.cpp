@@ -1,4 +1,4 @@
-#include "solver/app/blocks.hpp"
+#include "solver/run/blocks.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>

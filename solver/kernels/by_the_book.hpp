@@ -10,7 +10,8 @@
 //     law       what a wall point shows to i as if it were soil: velocity, stress          WallLaw; today: mirrored()
 //     contact   how much of that the surface passes on: all, no shear, or Coulomb's limit  passed_on(), limit_to_friction()
 // Tension is positive. Legend: i the particle, j its neighbour, x_ij = x_i - x_j, r = |x_ij|, q = r/h, n outward normal of a wall.
-#include "solver/physics/terms.hpp"
+#include "solver/effects/artificial_stress.hpp"
+#include "solver/effects/pore_water.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/shape.hpp"
 #include <functional>

@@ -1,7 +1,7 @@
 #pragma once
 // What a cut for any number of ranks gives each of them, counted on one machine: the same blocks, weights and cut as a
 // run's. Serial in ranks, parallel in threads, no MPI.
-#include "solver/app/blocks.hpp"
+#include "solver/run/blocks.hpp"
 
 namespace kuzure {
 

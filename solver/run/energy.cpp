@@ -1,4 +1,4 @@
-#include "solver/app/energy.hpp"
+#include "solver/run/energy.hpp"
 #include <bit>
 #include <fmt/format.h>
 
@@ -11,25 +11,42 @@ StateEnergy state_energy(const Team& team, const Particles& p, std::span<const M
     const auto s = p[field::stress];
     const auto rho = p[field::density];
     const auto soil = p[field::soil];
-    const double magic = unit * 6755399441055744.0; // 1.5 * 2^52
-    const auto quantized = [magic](double e) { return (e + magic) - magic; };
+    const double magic = magic_of(unit);
     double kinetic = 0, potential = 0, elastic = 0;
     const Index n = p.size();
 #pragma omp parallel for schedule(static) reduction(+ : kinetic, potential, elastic)
     for (Index i = 0; i < n; ++i) {
         const Material& m = soils[soil[i]];
         const double mass = m.density * volume;
-        kinetic += quantized(0.5 * mass * dot(v[i], v[i]));
-        potential +=
-            quantized(-mass * dot(gravity, x[i] - o[i]) + (water.present() ? volume * (water.at(x[i]).value - water.at(o[i]).value) : 0.0));
+        kinetic += quantized(0.5 * mass * dot(v[i], v[i]), magic);
+        potential += quantized(
+            -mass * dot(gravity, x[i] - o[i]) + (water.present() ? volume * (water.at(x[i]).value - water.at(o[i]).value) : 0.0), magic);
         // sigma : C^-1 : sigma/2 = J2/(2 G) + I1^2/(18 K)
         const Stress sigma = s[i];
         const double I1 = trace(sigma);
-        elastic += quantized(mass / rho[i] * (J2(deviator(sigma)) / (2 * m.shear) + I1 * I1 / (18 * m.bulk)));
+        elastic += quantized(mass / rho[i] * (J2(deviator(sigma)) / (2 * m.shear) + I1 * I1 / (18 * m.bulk)), magic);
     }
     double sums[3] = {kinetic, potential, elastic};
     team.sum(std::span<double>(sums));
     return {sums[0], sums[1], sums[2]};
+}
+
+DissipatedUnits over_ranks(const Team& team, DissipatedUnits mine)
+{
+    std::array<std::int64_t, std::tuple_size_v<decltype(DissipatedUnits::members)>> units;
+    std::size_t k = 0;
+    for_each_member(mine, mine, [&](std::int64_t& u, std::int64_t&) { units[k++] = u; });
+    team.sum(std::span<std::int64_t>(units));
+    k = 0;
+    for_each_member(mine, mine, [&](std::int64_t& u, std::int64_t&) { u = units[k++]; });
+    return mine;
+}
+
+double Ledger::sum() const
+{
+    double all = state.kinetic + state.potential + state.elastic;
+    for_each_member(dissipated, dissipated, [&](double e, double) { all += e; });
+    return all;
 }
 
 namespace {

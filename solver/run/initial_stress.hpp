@@ -1,6 +1,6 @@
 #pragma once
 // Stress "at rest": the weight of the soil above a point, and K0 times it sideways.
-#include "solver/physics/terms.hpp"
+#include "solver/effects/pore_water.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/scene.hpp"

@@ -3,7 +3,11 @@
 // ranks: every addend is rounded to one unit, fixed for the run; sums of such numbers are exact.
 #include "solver/core/particles.hpp"
 #include "solver/core/team.hpp"
-#include "solver/kernels/step.hpp"
+#include "solver/effects/pore_water.hpp"
+#include "solver/pairs/tally.hpp"
+#include "solver/scene/material.hpp"
+#include <span>
+#include <string>
 
 namespace kuzure {
 
@@ -16,22 +20,22 @@ struct StateEnergy {
 /// What left the mechanical ledger since the start, in whole units. Exact; addition in any order.
 struct DissipatedUnits {
     std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0;
+    static constexpr std::tuple members{&DissipatedUnits::plastic, &DissipatedUnits::viscous, &DissipatedUnits::wall,
+                                        &DissipatedUnits::damping};
     void add(const EnergySums& e, double unit)
     {
-        plastic += std::int64_t(e.plastic / unit), viscous += std::int64_t(e.viscous / unit);
-        wall += std::int64_t(e.wall / unit), damping += std::int64_t(e.damping / unit);
+        for_each_member(*this, e, [unit](std::int64_t& units, double joules) { units += std::int64_t(joules / unit); });
     }
 };
+
+/// Collective: over all ranks.
+DissipatedUnits over_ranks(const Team&, DissipatedUnits);
 
 /// One row of the ledger, the same bits on every rank.
 struct Ledger {
     StateEnergy state;
     EnergySums dissipated;
-    double sum() const
-    {
-        return state.kinetic + state.potential + state.elastic + dissipated.plastic + dissipated.viscous + dissipated.wall +
-               dissipated.damping;
-    }
+    double sum() const;
 };
 
 /// Collective. Energies of the present state; `unit` (J) must be a power of two far below them.

@@ -1,0 +1,326 @@
+#pragma once
+// What a scene file says, once: every key stands here beside the member it is read into, with its unit, range, default,
+// example and words. Reader, writer, hash, table of keys, reference and JSON Schema are visitors A of describe().
+// A key is needed unless it has a fallback, is optional or is read into a std::optional.
+#include "io/scene_keys.hpp"
+#include "solver/scene/scene.hpp"
+#include <numbers>
+#include <string>
+
+namespace kuzure::io {
+
+/// Angles are degrees in files, radians in scenes.
+inline const double radians_per_degree = std::numbers::pi / 180;
+
+/// What there is to know of a key beside its path and kind.
+struct KeyInfo {
+    const char* unit = ""; // "1": a plain number; "of ...": a share of that
+    Range range{};
+    const char* fallback = ""; // the default as TOML; of what presets set, presets() has it
+    bool optional = false;     // may be absent though its member always has a value
+    const char* example = "";  // a value as TOML
+    const char* doc = "";
+    Role role = Role::Physics; // of a section: of all its keys
+};
+
+// m; beyond it nobody means metres
+constexpr Range place = between(-1e9, 1e9), size = above_to(0, 1e9);
+
+template <class A> void describe_shape(A& a, const std::string& path, scene::Shape& shape)
+{
+    a.template alternative<scene::Box>(
+        path + ".box", shape, {.example = "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }", .doc = "a box of whole spacings a side"},
+        [&](const std::string& p, auto& s) {
+            a.vector(p + ".low", s.low, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "lower corner"});
+            a.vector(p + ".high", s.high, {.unit = "m", .range = place, .example = "[1.0, 1.0, 1.0]", .doc = "upper corner"});
+        });
+    a.template alternative<scene::Cylinder>(
+        path + ".cylinder", shape,
+        {.example = "{ base = [0.0, 0.0, 0.0], radius = 0.1, height = 0.2 }", .doc = "an upright cylinder (3-D)"},
+        [&](const std::string& p, auto& s) {
+            a.vector(p + ".base", s.base, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "centre of its lower face"});
+            a.number(p + ".radius", s.radius, {.unit = "m", .range = size, .example = "0.1", .doc = "radius"});
+            a.number(p + ".height", s.height, {.unit = "m", .range = size, .example = "0.2", .doc = "height along z"});
+        });
+    a.template alternative<scene::Sphere>(
+        path + ".sphere", shape, {.example = "{ center = [0.0, 0.0, 0.0], radius = 0.1 }", .doc = "a sphere, in 2-D a disc"},
+        [&](const std::string& p, auto& s) {
+            a.vector(p + ".center", s.center, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "centre"});
+            a.number(p + ".radius", s.radius, {.unit = "m", .range = size, .example = "0.1", .doc = "radius"});
+        });
+    a.template alternative<scene::Polygon>(
+        path + ".polygon", shape,
+        {.example = "{ points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], y = [0.0, 1.0] }", .doc = "a polygon in x-z, drawn out along y"},
+        [&](const std::string& p, auto& s) {
+            a.points(
+                p + ".points", s.points,
+                {.unit = "m", .range = place, .example = "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]", .doc = "its corners [x, z] in order"});
+            a.pair(p + ".y", s.y,
+                   {.unit = "m",
+                    .range = place,
+                    .optional = true,
+                    .example = "[0.0, 1.0]",
+                    .doc = "its extent along y; needed in 3-D, left out in 2-D"});
+        });
+}
+
+template <class A> void describe_soil(A& a, const std::string& path, scene::Soil& soil)
+{
+    a.number(path + ".density", soil.density,
+             {.unit = "kg/m^3", .range = above(0), .example = "1850.0", .doc = "bulk density at the start"});
+    a.number(path + ".young", soil.young, {.unit = "Pa", .range = above(0), .example = "1.8e6", .doc = "Young's modulus"});
+    a.number(path + ".poisson", soil.poisson, {.unit = "1", .range = from_below(0, 0.5), .example = "0.3", .doc = "Poisson's ratio"});
+    a.number(path + ".cohesion", soil.cohesion,
+             {.unit = "Pa", .range = from(0), .fallback = "0.0", .example = "5000.0", .doc = "cohesion c"});
+    a.angle(path + ".friction_angle", soil.friction_angle,
+            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "25.0", .doc = "friction angle phi"});
+    a.angle(path + ".dilation_angle", soil.dilation_angle,
+            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "0.0", .doc = "dilation angle psi, at most phi"});
+    a.choice(path + ".cone", soil.cone,
+             {{"compression", scene::Cone::Compression},
+              {"extension", scene::Cone::Extension},
+              {"plane strain", scene::Cone::PlaneStrain},
+              {"plane strain, no dilation", scene::Cone::PlaneStrainNoDilation}},
+             {.fallback = "\"compression\"", .example = "\"compression\"", .doc = "how the Drucker-Prager cone is fitted to c and phi"});
+    a.number(path + ".tension_cutoff", soil.tension_cutoff,
+             {.unit = "Pa", .range = from(0), .example = "1000.0", .doc = "largest mean tension, at most the cone's apex c cot(phi)"});
+    a.number(path + ".dilation_decay", soil.dilation_decay,
+             {.unit = "1",
+              .range = above(0),
+              .example = "0.1",
+              .doc = "plastic shear strain over which dilation dies out linearly; without it dilation stays"});
+    a.table(path + ".softening", soil.softening,
+            {.example = "{ friction_angle = 20.0, slip = 0.02 }", .doc = "strength falls linearly to a residual one"},
+            [&](const std::string& p, auto& v) {
+                a.number(
+                    p + ".cohesion", v.cohesion,
+                    {.unit = "Pa", .range = from(0), .fallback = "0.0", .example = "0.0", .doc = "residual cohesion, at most the first"});
+                a.angle(p + ".friction_angle", v.friction_angle,
+                        {.unit = "deg",
+                         .range = from_below(0, 90),
+                         .fallback = "0.0",
+                         .example = "20.0",
+                         .doc = "residual friction angle, at most the first"});
+                a.number(p + ".slip", v.slip,
+                         {.unit = "m",
+                          .range = above(0),
+                          .example = "0.02",
+                          .doc = "slip across a shear band (taken 2 h wide) at which the residual strength is reached"});
+            });
+    a.table(path + ".rate_friction", soil.rate_friction,
+            {.example = "{ friction_angle = 33.0, inertial_number = 0.3, grain = 0.001, grain_density = 2600.0 }",
+             .doc = "mu(I): friction grows with the rate of shear"},
+            [&](const std::string& p, auto& v) {
+                a.angle(p + ".friction_angle", v.friction_angle,
+                        {.unit = "deg",
+                         .range = from_below(0, 90),
+                         .example = "33.0",
+                         .doc = "friction angle of fast flow, at least that at rest"});
+                a.number(
+                    p + ".inertial_number", v.inertial_number,
+                    {.unit = "1", .range = above(0), .fallback = "0.3", .example = "0.3", .doc = "I_0, where half the growth is reached"});
+                a.number(p + ".grain", v.grain, {.unit = "m", .range = above(0), .example = "0.001", .doc = "diameter of a grain"});
+                a.number(p + ".grain_density", v.grain_density,
+                         {.unit = "kg/m^3", .range = above(0), .fallback = "2600.0", .example = "2600.0", .doc = "density of a grain"});
+            });
+}
+
+template <class A> void describe_effects(A& a, scene::Effects& effects)
+{
+    a.section("effects", {.fallback = "{}",
+                          .example = "{ gravity = [0.0, 0.0, -9.81] }",
+                          .doc = "what is simulated beyond the soil itself: only what is written"});
+    a.vector("effects.gravity", effects.gravity,
+             {.unit = "m/s^2", .range = between(-1e6, 1e6), .example = "[0.0, 0.0, -9.81]", .doc = "body force per mass"});
+    a.table("effects.viscosity", effects.viscosity,
+            {.example = "{ alpha = 0.1, beta = 0.0 }", .doc = "artificial viscosity against the P-wave speed"},
+            [&](const std::string& p, auto& v) {
+                a.number(p + ".alpha", v.alpha, {.unit = "1", .range = between(0, 10), .example = "0.1", .doc = "linear part"});
+                a.number(p + ".beta", v.beta,
+                         {.unit = "1", .range = between(0, 10), .fallback = "0.0", .example = "0.0", .doc = "quadratic part"});
+            });
+    a.automatic(
+        "effects.artificial_stress", effects.artificial_stress, effects.artificial_stress_decision,
+        {.example = "\"auto\"", .doc = "against tensile instability; \"auto\" is on exactly where tension can exist"},
+        [&](const std::string& p, auto& v) {
+            a.number(
+                p + ".epsilon", v.epsilon,
+                {.unit = "1", .range = between(0, 1), .fallback = "0.5", .example = "0.5", .doc = "share of the tensile principal stress"});
+            a.number(
+                p + ".exponent", v.exponent,
+                {.unit = "1", .range = above_to(0, 20), .fallback = "2.55", .example = "2.55", .doc = "exponent n of W(r)/W(spacing)"});
+        });
+    a.automatic("effects.stress_diffusion", effects.stress_diffusion, effects.stress_diffusion_decision,
+                {.example = "{ zeta = 0.1 }",
+                 .doc = "against noise in the stress; \"auto\" is on for one dry soil in boxes or cylinders under vertical gravity"},
+                [&](const std::string& p, auto& v) {
+                    a.number(p + ".zeta", v.zeta,
+                             {.unit = "1", .range = between(0, 1), .fallback = "0.1", .example = "0.1", .doc = "strength"});
+                });
+    a.table("effects.pore_pressure", effects.pore_pressure,
+            {.example = "{ table = [[0.0, 4.0], [20.0, 1.0]] }",
+             .doc = "still pore water: buoyancy and seepage of a given water table; stresses are then effective"},
+            [&](const std::string& p, auto& v) {
+                a.points(p + ".table", v.table,
+                         {.unit = "m", .range = place, .example = "[[0.0, 4.0], [20.0, 1.0]]", .doc = "its corners [x, z], x increasing"});
+                a.number(p + ".density", v.density,
+                         {.unit = "kg/m^3", .range = above(0), .fallback = "1000.0", .example = "1000.0", .doc = "density of the water"});
+            });
+    a.table("effects.damping", effects.damping,
+            {.example = "{ ratio = 0.02, until = 0.5 }", .doc = "viscous damping to settle an initial state"},
+            [&](const std::string& p, auto& v) {
+                a.number(p + ".ratio", v.ratio, {.unit = "of critical", .range = above_to(0, 10), .example = "0.02", .doc = "strength"});
+                a.number(p + ".until", v.until,
+                         {.unit = "s", .range = above(0), .example = "0.5", .doc = "time at which it is switched off"});
+            });
+}
+
+template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
+{
+    a.section("accuracy", {.fallback = "{}", .example = "{ cfl = 0.2 }", .doc = "everything that trades error for time"});
+    a.choice("accuracy.preset", accuracy.preset, preset_words(),
+             {.fallback = "\"standard\"",
+              .example = "\"fast\"",
+              .doc = "sets the keys of this section and space.h that are not written (docs/accuracy.md)",
+              .role = Role::Bookkeeping});
+    a.choice("accuracy.kernel", accuracy.kernel,
+             {{"cubic spline", scene::Kernel::CubicSpline},
+              {"wendland c2", scene::Kernel::WendlandC2},
+              {"wendland c4", scene::Kernel::WendlandC4}},
+             {.example = "\"wendland c2\"", .doc = "smoothing kernel"});
+    a.number("accuracy.cfl", accuracy.cfl,
+             {.unit = "1", .range = above(0), .example = "0.2", .doc = "Courant number of the step where time.step is absent"});
+    a.choice("accuracy.precision", accuracy.precision, {{"double", scene::Precision::Double}, {"mixed", scene::Precision::Mixed}},
+             {.example = "\"double\"", .doc = "\"mixed\": pair sums in single, state in double precision"});
+    a.choice("accuracy.correction", accuracy.correction, {{"none", scene::Correction::None}, {"gradient", scene::Correction::Gradient}},
+             {.example = "\"none\"", .doc = "\"gradient\": velocity gradients exact for linear fields, also at surfaces"});
+    a.number("accuracy.skin", accuracy.skin,
+             {.unit = "supports",
+              .range = between(0.01, 0.5),
+              .example = "0.1",
+              .doc = "reach of neighbour lists beyond the support: cost only"});
+    a.number("accuracy.sleep_below", accuracy.sleep_below,
+             {.unit = "m/s",
+              .range = from(0),
+              .fallback = "0.0",
+              .example = "0.001",
+              .doc = "soil slower than this, and not about to move, among soil that is too, keeps its state until it is looked at again "
+                     "(docs/performance.md); 0: never"});
+}
+
+template <class A> void describe_output(A& a, scene::Output& output)
+{
+    a.section("output",
+              {.fallback = "{}", .example = "{ every = 0.05 }", .doc = "what a run leaves in its directory", .role = Role::Bookkeeping});
+    a.text("output.directory", output.directory,
+           {.optional = true, .example = "\"results/seed-52\"", .doc = "result directory; without it results/<scene file's name>"});
+    a.number("output.every", output.every,
+             {.unit = "s", .range = above(0), .example = "0.05", .doc = "time between snapshots; without it the first and the last state"});
+    a.choices("output.fields", output.fields, {"velocity", "stress", "density", "plastic_strain", "displacement"},
+              {.fallback = R"(["velocity", "stress", "density", "plastic_strain", "displacement"])",
+               .example = "[\"velocity\", \"stress\"]",
+               .doc = "fields of snapshots beside position, id, kind and soil"});
+    a.number("output.history", output.history,
+             {.unit = "s",
+              .range = above(0),
+              .example = "0.001",
+              .doc = "time between rows of history.csv; without it the first and the last state"});
+    a.number("output.grain", output.grain,
+             {.unit = "m",
+              .range = above(0),
+              .example = "0.04",
+              .doc = "height from which a column counts as soil in history.csv; without it one spacing"});
+    a.number("output.checkpoint_minutes", output.checkpoint_minutes,
+             {.unit = "min", .range = above(0), .fallback = "30.0", .example = "30.0", .doc = "wall time between checkpoints"});
+    a.table("output.picture", output.picture,
+            {.example = R"({ view = "oblique", color = "displacement" })", .doc = "pictures of the snapshots"},
+            [&](const std::string& p, auto& v) {
+                a.choice(
+                    p + ".view", v.view,
+                    {{"oblique", scene::View::Oblique}, {"side", scene::View::Side}, {"top", scene::View::Top}, {"cut", scene::View::Cut}},
+                    {.fallback = "\"oblique\"",
+                     .example = "\"oblique\"",
+                     .doc = "where from; \"cut\": a slice two spacings thick along x, through the middle of the soil at the start"});
+                a.choice(p + ".color", v.color,
+                         {{"displacement", scene::Color::Displacement},
+                          {"speed", scene::Color::Speed},
+                          {"plastic_strain", scene::Color::PlasticStrain},
+                          {"pressure", scene::Color::Pressure}},
+                         {.fallback = "\"displacement\"", .example = "\"displacement\"", .doc = "what the colour shows"});
+                a.pair(p + ".range", v.range,
+                       {.unit = "of the colour",
+                        .optional = true,
+                        .example = "[0.0, 1.0]",
+                        .doc = "least and largest value of the colours (m, m/s, 1, Pa), the same in every picture; without it what the "
+                               "soil shows, anew each time"});
+            });
+    a.flag("output.movie", output.movie,
+           {.fallback = "false", .example = "true", .doc = "the pictures as a film at the end (needs ffmpeg)"});
+}
+
+/// Every key of a scene, in the order in which scenes are written.
+template <class A> void describe(A& a, Scene& s)
+{
+    a.text("title", s.title, {.example = "\"self-weight collapse\"", .doc = "what this scene is", .role = Role::Bookkeeping});
+    a.integer("dimensions", s.dimensions,
+              {.range = between(2, 3), .example = "3", .doc = "3, or 2: plane strain in x-z with a full 3-D stress tensor"});
+
+    a.section("space", {.example = "{ spacing = 0.04 }", .doc = "resolution and extent"});
+    a.number("space.spacing", s.space.spacing,
+             {.unit = "m", .range = between(1e-6, 1e6), .example = "0.04", .doc = "initial distance of particles"});
+    a.number("space.h", s.space.h,
+             {.unit = "spacings", .range = between(0.8, 3), .example = "1.3", .doc = "smoothing length; the support is 2 h"});
+    a.vector("space.low", s.space.low,
+             {.unit = "m", .range = place, .example = "[-1.0, -1.0, -0.5]", .doc = "lower corner of the box that particles may not leave"});
+    a.vector("space.high", s.space.high,
+             {.unit = "m", .range = place, .example = "[10.0, 10.0, 5.0]", .doc = "upper corner of the box that particles may not leave"});
+    a.axes("space.periodic", s.space.periodic,
+           {.optional = true, .example = "[\"y\"]", .doc = "axes along which space repeats from low to high"});
+
+    a.section("time", {.example = "{ end = 1.0 }", .doc = "how long, in which steps"});
+    a.number("time.end", s.time.end,
+             {.unit = "s", .range = above(0), .example = "1.0", .doc = "time at which the run ends", .role = Role::Bookkeeping});
+    a.number("time.step", s.time.step,
+             {.unit = "s", .range = above(0), .example = "1.0e-4", .doc = "fixed step; without it the step follows accuracy.cfl"});
+    a.flag("time.retry", s.time.retry,
+           {.fallback = "false",
+            .example = "true",
+            .doc = "when numbers fail: back to the last good state in memory and on with half the step, once for each trouble"});
+
+    a.soils("soil", s.soils, {.example = "[soil.sand]", .doc = "any number of soils, each with a name"},
+            [&](const std::string& path, scene::Soil& soil) { describe_soil(a, path, soil); });
+    a.tables("body", s.bodies, {.example = "[[body]]", .doc = "soil of one shape; bodies may touch, not overlap"},
+             [&](const std::string& path, scene::Body& body) {
+                 a.soil_of(path + ".soil", body.soil, s.soils, {.example = "\"sand\"", .doc = "name of the soil it is made of"});
+                 describe_shape(a, path, body.shape);
+                 a.vector(path + ".velocity", body.velocity,
+                          {.unit = "m/s",
+                           .range = between(-1e6, 1e6),
+                           .fallback = "[0.0, 0.0, 0.0]",
+                           .example = "[0.0, 0.0, -1.0]",
+                           .doc = "velocity at the start"});
+                 a.choice(
+                     path + ".stress", body.stress, {{"none", scene::InitialStress::None}, {"at rest", scene::InitialStress::AtRest}},
+                     {.fallback = "\"none\"", .example = "\"none\"", .doc = "stress at the start; \"at rest\" is K0 under its own weight"});
+             });
+    a.tables("wall", s.walls, {.optional = true, .example = "[[wall]]", .doc = "fixed particles of one shape"},
+             [&](const std::string& path, scene::Wall& wall) {
+                 describe_shape(a, path, wall.shape);
+                 a.choice_or_table(
+                     path + ".surface", wall.surface, {{"rough", scene::Surface::Rough}, {"smooth", scene::Surface::Smooth}},
+                     scene::Surface::Coulomb,
+                     {.fallback = "\"rough\"",
+                      .example = "\"rough\"",
+                      .doc = "\"rough\" (no slip), \"smooth\" (free slip) or { friction_angle } (Coulomb)"},
+                     [&](const std::string& p) {
+                         a.angle(p + ".friction_angle", wall.friction_angle,
+                                 {.unit = "deg", .range = from_below(0, 90), .example = "20.0", .doc = "Coulomb friction of the wall"});
+                     });
+             });
+
+    describe_effects(a, s.effects);
+    describe_accuracy(a, s.accuracy);
+    describe_output(a, s.output);
+}
+
+} // namespace kuzure::io

@@ -1,0 +1,63 @@
+#pragma once
+// A model is a smoothing kernel and the terms of the pair loop: its type says what the loop contains.
+#include "solver/effects/artificial_stress.hpp"
+#include "solver/effects/gradient_correction.hpp"
+#include "solver/effects/stress_diffusion.hpp"
+#include "solver/effects/viscosity.hpp"
+#include "solver/physics/smoothing.hpp"
+#include <string>
+
+namespace kuzure {
+
+/// Kernel and terms with lengths in units of `unit` metres (1, or h in mixed precision).
+template <class KernelType, class Viscous, class Tensile = NoArtificialStress, class Diffusive = NoStressDiffusion,
+          class Corrected = NoCorrection>
+struct Model {
+    using Kernel = KernelType;
+    using ArtificialStressTerm = Tensile;
+    using DiffusionTerm = Diffusive;
+    using CorrectionTerm = Corrected;
+    static constexpr bool viscous = !std::is_same_v<Viscous, NoViscosity>;
+    static constexpr bool tensile = std::is_same_v<Tensile, ArtificialStress>;
+    static constexpr bool diffusive = std::is_same_v<Diffusive, StressDiffusion>;
+    static constexpr bool corrected = std::is_same_v<Corrected, GradientCorrection>;
+    Kernel kernel;
+    Viscous viscosity;
+    Tensile artificial_stress;
+    Diffusive stress_diffusion;
+    Corrected correction;
+    bool correct; // a model with the correction compiled in also serves scenes without
+
+    static Model from(const scene::Interactions& s, double unit)
+    {
+        const Kernel kernel(s.h / unit, s.dimensions);
+        return {kernel,
+                Viscous::from(s.effects, kernel.h),
+                Tensile::from(s.effects, kernel, s.spacing / unit),
+                Diffusive::from(s.effects),
+                {},
+                s.correction == scene::Correction::Gradient};
+    }
+    static bool covers(const scene::Interactions& s)
+    {
+        const scene::Kernel asked = s.kernel;
+        const bool same = std::is_same_v<Kernel, CubicSpline>  ? asked == scene::Kernel::CubicSpline
+                          : std::is_same_v<Kernel, WendlandC2> ? asked == scene::Kernel::WendlandC2
+                                                               : asked == scene::Kernel::WendlandC4;
+        return same && Viscous::covers(s.effects) && (tensile || !s.effects.artificial_stress) &&
+               (diffusive || !s.effects.stress_diffusion) && (corrected || s.correction == scene::Correction::None);
+    }
+    static std::string name()
+    {
+        std::string s = std::is_same_v<Kernel, CubicSpline>  ? "cubic spline"
+                        : std::is_same_v<Kernel, WendlandC2> ? "wendland c2"
+                                                             : "wendland c4";
+        if (viscous) s += " + viscosity";
+        if (tensile) s += " + artificial stress";
+        if (diffusive) s += " + stress diffusion";
+        if (corrected) s += " + gradient correction";
+        return s;
+    }
+};
+
+} // namespace kuzure

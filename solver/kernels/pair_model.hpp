@@ -1,0 +1,93 @@
+#pragma once
+// A compiled pair model: the stages of a time step over its own records. The app sees this interface alone, so that kernels'
+// templates and number types stay behind it.
+#include "solver/core/particles.hpp"
+#include "solver/neighbours/lists.hpp"
+#include "solver/pairs/tally.hpp"
+#include "solver/scene/material.hpp"
+#include "solver/scene/parts.hpp"
+#include <memory>
+#include <optional>
+
+namespace kuzure {
+
+/// What a step of given length does to velocities besides the pair forces.
+struct StepForces {
+    Vector gravity{};   // m/s^2
+    double damping = 0; // 1/s: -damping v
+};
+
+/// What a step does about soil at rest: nothing; find the calm, who neither move nor are about to (|v| + detection_interval |a|
+/// below a speed); let those fall asleep who are calm among calm neighbours, by the step before; keep the state of sleepers.
+enum class SleepStage { Off, Detect, Freeze, Frozen };
+
+/// What a step asks of a model, the same for all stages and clusters.
+struct StepInput {
+    Particles* particles; // with the model's fields
+    ClusterLists* lists;
+    std::span<const Material> soils;
+    bool prune = true; // make the pruned lists anew from the lists; else those of an earlier pass hold everything in reach
+    double margin = 0; // m, how far beyond the support the pruned lists reach
+    double dt;         // length of this step, s
+    double kick;       // half of the step before and half of this one, s
+    StepForces forces;
+    bool evolving = false; // a soil's cone changes with strain or its rate
+    double energy_unit;    // J
+    std::optional<Vector> low = {}, high = {};
+    SleepStage sleep = SleepStage::Off;            // else `particles` has field::activity
+    double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest
+};
+
+/// One stage of a step: a pass over all clusters, and the exchange of ghost rows before it.
+struct Stage {
+    const char* name;
+    std::size_t row_bytes; // of a ghost
+    /// Floating-point operations of one directed pair (an fma counts two; square root, division, min and max one), and of
+    /// the update of one particle; bytes of main memory that one particle's update moves: for the roofline.
+    double flops_per_pair, flops_per_particle, bytes_per_particle;
+};
+
+enum class Arithmetic { Simd, Scalar };
+
+/// Kernel, terms, integrator, precision and lanes, chosen once a run; owns the records of this rank's particles and ghosts.
+class PairModel {
+public:
+    virtual ~PairModel() = default;
+    virtual std::string name() const = 0;
+    /// Particles a cluster must hold.
+    virtual int cluster_width() const = 0;
+    virtual scene::Precision precision() const = 0;
+    /// The passes of one step, in order.
+    virtual std::span<const Stage> stages() const = 0;
+    /// Bytes of the records of one particle.
+    virtual std::size_t record_bytes() const = 0;
+    /// Columns that the scheme advances; others are the run's.
+    virtual void require_fields(Particles&) const = 0;
+    /// Those columns at the start of a run, from the state: velocity, density, stress.
+    virtual void start(Particles&) const = 0;
+
+    /// Records of owned particles, from their columns, and room for so many ghosts of these soils.
+    virtual void make_records(const Particles&, std::span<const Material>, std::span<const std::int32_t> ghost_soil) = 0;
+    /// The wall points near this rank's soil; the walls themselves must outlive the model's use.
+    virtual void place_walls(std::span<const scene::Wall>, std::span<const WallPoints>) = 0;
+
+    /// One stage over some clusters. Ghosts must have arrived where the clusters' lists hold any.
+    virtual PassResult run(int stage, const StepInput&, std::span<const Index> clusters) = 0;
+    /// After the last cluster of a stage.
+    virtual void end_stage(int stage) = 0;
+    /// Ghost rows of a stage: that of an owned particle seen from another period (m), and back to its slot. Threads call them at once.
+    virtual void pack(int stage, Index owned, Vector shift, std::byte* to) const = 0;
+    virtual void unpack(int stage, Index slot, const std::byte* from) = 0;
+
+    /// Bytes of its arrays.
+    virtual std::size_t bytes() const = 0;
+};
+
+/// Bytes of the ghost rows of one particle in a whole step.
+std::size_t row_bytes(const PairModel&);
+
+/// The cheapest compiled model that contains every pair term of the scene (whose "auto" effects are resolved).
+std::unique_ptr<PairModel> choose_model(const scene::Interactions&, Arithmetic);
+std::unique_ptr<PairModel> choose_model(const Scene&, Arithmetic);
+
+} // namespace kuzure

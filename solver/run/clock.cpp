@@ -1,0 +1,27 @@
+#include "solver/run/clock.hpp"
+#include <limits>
+
+namespace kuzure {
+
+double step_length(const Scene& scene, const Clock& clock)
+{
+    const double end = scene.time.end;
+    if (scene.time.step) {
+        const double dt = clock.step_scale * *scene.time.step;
+        return clock.step - clock.base_step < std::llround((end - clock.base_time) / dt) ? dt : 0;
+    }
+    if (clock.time >= end) return 0;
+    const double h = scene.smoothing_length(), a = std::sqrt(clock.extremes.acceleration2);
+    const double limit = std::min(h / clock.extremes.signal, a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity());
+    const double dt = clock.step_scale * scene.accuracy.cfl * limit;
+    // The last step is shortened to end on time; a remainder of round-off is not a step.
+    return clock.time + dt * (1 + 1e-9) >= end ? end - clock.time : dt;
+}
+
+double time_after(const Scene& scene, const Clock& clock, double dt)
+{
+    if (scene.time.step) return clock.base_time + double(clock.step + 1 - clock.base_step) * dt;
+    return clock.time + dt * (1 + 1e-9) >= scene.time.end ? scene.time.end : clock.time + dt;
+}
+
+} // namespace kuzure

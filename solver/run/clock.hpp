@@ -1,0 +1,31 @@
+#pragma once
+// Where a run stands in time, and how long its next step is. Decided from numbers that all ranks share.
+#include "solver/pairs/tally.hpp"
+#include "solver/run/energy.hpp"
+#include "solver/scene/scene.hpp"
+
+namespace kuzure {
+
+/// Everything but the particles that a restart needs to go on bit for bit.
+struct Clock {
+    double time = 0; // s
+    std::int64_t step = 0;
+    double dt = 0;              // s, length of the step before
+    Extremes extremes{};        // of the step before, over all particles
+    std::int64_t pairs = 0;     // summed over steps and ranks (kept by rank 0)
+    DissipatedUnits dissipated; // over ranks (kept by rank 0)
+    double energy_at_start = 0; // J
+    double energy_unit = 0;     // J
+    // Steps are the scene's times step_scale since base_step, which began at base_time: 1, 0, 0 unless a retry halved them.
+    double step_scale = 1, base_time = 0; // 1, s
+    std::int64_t base_step = 0;
+    std::int64_t inspected = 0; // step of the guard's last inspection
+};
+
+/// Length of the step that starts at clock.time, s, 0 when the end time is reached:
+///     dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|) ),  or the scene's fixed step; the last one ends on time.
+double step_length(const Scene&, const Clock&);
+/// Where a step of this length ends, s.
+double time_after(const Scene&, const Clock&, double dt);
+
+} // namespace kuzure

@@ -1,0 +1,176 @@
+#include "solver/run/layout.hpp"
+#include "solver/run/blocks.hpp"
+#include <limits>
+
+namespace kuzure {
+
+Layout::Layout(const Scene& scene, const scene::Filling& filling, Vector origin)
+    : scene_(scene), filling_(filling), columns_(Columns::of(scene, origin)), reach_(list_reach(scene)),
+      skin_(scene.support() * scene.accuracy.skin)
+{
+}
+
+bool Layout::outgrown(double displacement2) const { return !built_ || 2 * std::sqrt(displacement2) > skin_ * (1 - 1e-6); }
+
+void Layout::wrap_into_period(Particles& p) const
+{
+    if (!scene_.space.low) return;
+    const Vector lo = *scene_.space.low, hi = *scene_.space.high;
+    const auto wrap = [&](int axis, double a, double b) {
+        if (!scene_.space.periodic[axis]) return;
+        double* x = p[field::position].column[axis];
+        double* o = p[field::origin].column[axis];
+        for (Index i = 0; i < p.size(); ++i) {
+            const double turns = std::floor((x[i] - a) / (b - a));
+            if (turns == 0) continue;
+            x[i] -= turns * (b - a), o[i] -= turns * (b - a);
+            x[i] = std::min(std::max(x[i], a), b);
+        }
+    };
+    wrap(0, lo.x, hi.x), wrap(1, lo.y, hi.y), wrap(2, lo.z, hi.z);
+}
+
+void Layout::sort_at_present_positions(Particles& p) const
+{
+    const Index n = p.size();
+    const auto x = p[field::position], to = p[field::sorted_position];
+    for (int c = 0; c < 3; ++c)
+#pragma omp parallel for schedule(static)
+        for (Index i = 0; i < n; ++i) to.column[c][i] = x.column[c][i];
+}
+
+void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::span<const Material> soils, PairModel& model,
+                     Timers& timers)
+{
+    rethrow_on_all_ranks(comm, [&] {
+        timers.timed(Phase::Sort, [&] {
+            const auto x = p[field::sorted_position];
+            sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
+            p.gather(sorted_.order);
+        });
+        // every column read and written once
+        timers.did(Phase::Sort, 0, 2.0 * double(p.bytes_per_particle()) * double(p.size()));
+    });
+    timers.timed(Phase::Ghosts, [&] {
+        exchange_ghosts(comm, domain, p, model);
+        renew_walls(p, model);
+    });
+    timers.timed(Phase::Lists, [&] {
+        const auto x = std::as_const(p)[field::sorted_position];
+        const SortedPoints owned{x.column[0], x.column[1], x.column[2], std::as_const(p)[field::id].column[0], &sorted_, p.size()};
+        const SortedPoints around{ghost_x_.data(), ghost_y_.data(), ghost_z_.data(), ghost_id_.data(), &ghost_sorted_, ghosts()};
+        lists_.build(columns_, owned, around, walls_, reach_, model.cluster_width());
+        model.make_records(p, soils, ghost_soil_);
+    });
+    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its place and record.
+    const auto entries = double(lists_.entries() + lists_.wall_entries());
+    timers.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + model.record_bytes() / 2));
+    pruned_margin_ = 0;
+    built_ = true;
+}
+
+void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model)
+{
+    std::vector<std::size_t> rows;
+    for (const Stage& s : model.stages()) rows.push_back(s.row_bytes);
+    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), rows);
+    const auto arrived = halo_->ghosts(p);
+    const auto n = Index(arrived.size());
+    Array<double> x(n), y(n), z(n);
+    Array<std::int64_t> id(n);
+    for (Index k = 0; k < n; ++k)
+        x[k] = arrived[k].sorted_position.x, y[k] = arrived[k].sorted_position.y, z[k] = arrived[k].sorted_position.z,
+        id[k] = arrived[k].id;
+    ghost_sorted_ = sort_into_columns(columns_, x.data(), y.data(), z.data(), id.data(), n);
+    ghost_x_.resize(n), ghost_y_.resize(n), ghost_z_.resize(n), ghost_id_.resize(n), ghost_soil_.resize(n);
+    std::vector<Index> slot(n);
+    for (Index k = 0; k < n; ++k) {
+        const Index from = ghost_sorted_.order[k];
+        ghost_x_[k] = x[from], ghost_y_[k] = y[from], ghost_z_[k] = z[from], ghost_id_[k] = id[from];
+        ghost_soil_[k] = arrived[from].soil;
+        slot[from] = k;
+    }
+    halo_->place(slot);
+}
+
+void Layout::renew_walls(const Particles& p, PairModel& model)
+{
+    if (scene_.walls.empty() || p.size() == 0) return;
+    const auto x = p[field::sorted_position];
+    const double all = std::numeric_limits<double>::max();
+    Vector lo{all, all, all}, hi{-all, -all, -all};
+    for (Index i = 0; i < p.size(); ++i) {
+        const Vector a = x[i];
+        lo = {std::min(lo.x, a.x), std::min(lo.y, a.y), std::min(lo.z, a.z)};
+        hi = {std::max(hi.x, a.x), std::max(hi.y, a.y), std::max(hi.z, a.z)};
+    }
+    const auto inside = [](const scene::Box& a, const scene::Box& b) {
+        return a.low.x >= b.low.x && a.low.y >= b.low.y && a.low.z >= b.low.z && a.high.x <= b.high.x && a.high.y <= b.high.y &&
+               a.high.z <= b.high.z;
+    };
+    const Vector margin{reach_, reach_, reach_}, ahead = 3.0 * margin;
+    if (wall_region_ && inside({lo - margin, hi + margin}, *wall_region_)) return;
+    wall_region_ = scene::Box{lo - margin - ahead, hi + margin + ahead};
+    walls_.assign(scene_.walls.size(), {});
+    for (std::size_t w = 0; w < walls_.size(); ++w) walls_[w].wall = int(w);
+    // Walls repeat with the period as the soil does.
+    const Vector step = period(scene_);
+    const int px = scene_.space.periodic[0], py = scene_.space.periodic[1], pz = scene_.space.periodic[2];
+    for (int a = -px; a <= px; ++a)
+        for (int b = -py; b <= py; ++b)
+            for (int c = -pz; c <= pz; ++c) {
+                const Vector shift{a * step.x, b * step.y, c * step.z};
+                filling_.for_each_wall_in({wall_region_->low - shift, wall_region_->high - shift}, [&](std::int64_t id, Vector at, int w) {
+                    walls_[w].x.push_back(at.x + shift.x), walls_[w].y.push_back(at.y + shift.y), walls_[w].z.push_back(at.z + shift.z);
+                    walls_[w].id.push_back(id);
+                });
+            }
+    for (auto& w : walls_) w.sort(columns_);
+    model.place_walls(scene_.walls, walls_);
+}
+
+void Layout::prepare_lists(StepInput& in, double way, double speed)
+{
+    // No pair comes nearer than by twice the longest way of any particle; positions in mixed precision have grains of h/2^20.
+    const double grain = 4e-6 * scene_.smoothing_length();
+    in.prune = 2 * (pruned_way_ + way) + grain > pruned_margin_;
+    if (in.prune) {
+        // Instructions a cluster: 113 an entry of the pruned list, of which a margin of m supports adds 95 * 2.3 m; 25 for each of 117
+        // entries of the whole list in one of m/u steps, u the way of two particles in a step. Least in sum at m = sqrt(0.12 u).
+        constexpr double prune_cost = 25.0 * 117 / (113 * 95 * 2.3);
+        const double u = 2 * in.dt * speed / scene_.support();
+        pruned_margin_ = std::clamp(std::sqrt(prune_cost * u), 1e-4, scene_.accuracy.skin) * scene_.support();
+        // Pruned after this step's move, seen by a stage halfway along it.
+        if (way > 0) pruned_margin_ = std::max(pruned_margin_, way * (1 + 1e-6) + grain);
+        pruned_way_ = 0;
+    } else pruned_way_ += way;
+    in.margin = pruned_margin_;
+}
+
+Vector Layout::sorted(const Particles& p, Index record) const
+{
+    const Index n = p.size();
+    if (record < n) return p[field::sorted_position][record];
+    return {ghost_x_[record - n], ghost_y_[record - n], ghost_z_[record - n]};
+}
+
+std::size_t Layout::bytes() const
+{
+    std::size_t b = lists_.bytes() + std::size_t(ghosts()) * 32;
+    for (const auto& w : walls_) b += w.x.size() * (3 * sizeof(double) + sizeof(std::int64_t) + sizeof(Index));
+    return b;
+}
+
+void rethrow_on_all_ranks(const Comm& comm, const std::function<void()>& work)
+{
+    std::string complaint;
+    try {
+        work();
+    } catch (const NumbersFailed& e) {
+        complaint = e.what();
+    }
+    const int worst = int(comm.max(std::int64_t(complaint.empty() ? -1 : comm.rank())));
+    if (worst >= 0) throw NumbersFailed(comm.broadcast(complaint, worst));
+}
+
+} // namespace kuzure

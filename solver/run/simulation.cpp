@@ -1,0 +1,305 @@
+#include "solver/run/simulation.hpp"
+#include "solver/run/start.hpp"
+#include "solver/scene/check.hpp"
+#include <limits>
+#include <omp.h>
+
+namespace kuzure {
+
+namespace {
+std::vector<Material> materials(const Scene& scene)
+{
+    std::vector<Material> m;
+    for (const auto& s : scene.soils) m.push_back(Material::from(s));
+    return m;
+}
+} // namespace
+
+Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options, const Clock& clock)
+    : comm_(comm), scene_(scene), options_(std::move(options)),
+      filling_(options_.filling ? std::move(*options_.filling) : scene::Filling(scene)), soils_(materials(scene)),
+      model_(choose_model(scene, options_.arithmetic)), domain_(comm, block_space(scene, filling_, comm.size(), options_.blocks_per_rank)),
+      layout_(scene_, filling_, low_corner(filling_, scene)),
+      balance_(comm, domain_, layout_.reach(), double(row_bytes(*model_)), options_.recut_every), watch_(comm, scene_, filling_, soils_),
+      clock_(clock)
+{
+}
+
+Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options) : Simulation(comm, scene, std::move(options), Clock{})
+{
+    timers_.timed(Phase::Setup, [&] {
+        prepare();
+        balance_.cut_start(scene_, filling_, timers_);
+        fill_start(comm_, domain_, scene_, filling_, soils_, particles_);
+        if (options_.initial) options_.initial(particles_);
+        model_->start(particles_);
+        double fastest = 0;
+        for (Index i = 0; i < particles_.size(); ++i) {
+            const Vector v = std::as_const(particles_)[field::velocity][i];
+            fastest = std::max(fastest, dot(v, v));
+        }
+        clock_.extremes.speed2 = comm_.max(fastest);
+        clock_.energy_unit = energy_unit(energy_scale(scene_, filling_, soils_));
+        if (options_.initial && clock_.extremes.speed2 > 0) { // particles may have been made faster than the scene says
+            double mass = 0;
+            for (const auto& m : soils_) mass = std::max(mass, m.density * scene_.particle_volume() * double(filling_.soil_count()));
+            clock_.energy_unit = std::max(clock_.energy_unit, energy_unit(mass * clock_.extremes.speed2));
+        }
+        clock_.energy_at_start = ledger().sum();
+        const Vector g = scene_.effects.gravity.value_or(Vector{});
+        clock_.extremes.acceleration2 = dot(g, g);
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+    });
+}
+
+Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles, const Clock& clock, RunOptions options)
+    : Simulation(comm, scene, std::move(options), clock)
+{
+    timers_.timed(Phase::Setup, [&] {
+        particles_ = std::move(particles);
+        prepare();
+        work_.steps = clock.step;
+        if (comm_.rank() != 0) clock_.pairs = 0, clock_.dissipated = {};
+        balance_.cut_state(scene_, particles_, layout_, clock_.step > 0, [&] { rebuild(false); });
+    });
+}
+
+Simulation::~Simulation() = default;
+
+void Simulation::prepare()
+{
+    water_ = PoreWater::from(scene_.effects);
+    for (const auto& m : soils_) evolving_ = evolving_ || m.evolves();
+    particles_.require(field::position, field::velocity, field::density, field::stress, field::plastic_strain, field::sorted_position,
+                       field::origin, field::id, field::soil);
+    model_->require_fields(particles_);
+    if (scene_.accuracy.sleep_below > 0) {
+        particles_.require(field::activity);
+        sleep_interval_ = scene::sleep_interval(scene_);
+    }
+    // Denormals are flushed in every thread, whatever ran before.
+#pragma omp parallel
+    flush_denormals();
+}
+
+// ---- the step -----------------------------------------------------------------------------------------------------
+
+Requests Simulation::step(Requests mine)
+{
+    const double dt = next_dt();
+    ensure(dt > 0, "a finished run was asked for another step");
+    const bool rebuilt = layout_.outgrown(clock_.extremes.displacement2);
+    if (rebuilt) rebuild(true);
+    remember_if_good(rebuilt);
+    StepInput in = step_input(dt);
+    layout_.prepare_lists(in, 0, std::sqrt(clock_.extremes.speed2));
+    PassResult result;
+    for (int stage = 0; stage < int(model_->stages().size()); ++stage) result.add(run_stage(stage, in));
+    mine = end_step(dt, result, mine);
+    watch_.judge_step(particles_, clock_);
+    return mine;
+}
+
+void Simulation::rebuild(bool sort_anew)
+{
+    if (sort_anew)
+        timers_.timed(Phase::Migrate, [&] {
+            layout_.wrap_into_period(particles_);
+            balance_.migrate(scene_, particles_, layout_, rebuilds_, timers_);
+            layout_.sort_at_present_positions(particles_);
+        });
+    layout_.rebuild(comm_, domain_, particles_, soils_, *model_, timers_);
+    if (sort_anew) clock_.extremes.displacement2 = 0;
+    ++rebuilds_;
+}
+
+PassResult Simulation::run_stage(int stage, const StepInput& in)
+{
+    const Stage& s = model_->stages()[stage];
+    Halo& halo = layout_.halo();
+    const ClusterLists& lists = layout_.lists();
+    timers_.timed(Phase::HaloBegin, [&] {
+        halo.begin(s.row_bytes, [&](Index owned, Vector shift, std::byte* to) { model_->pack(stage, owned, shift, to); });
+    });
+    PassResult result = timers_.timed(Phase::Interior, [&] {
+        // MPI moves long messages only when it is called: in a few portions of the work, none smaller than threads like.
+        auto left = lists.interior();
+        const std::size_t portions = halo.messages_per_refresh() > 0 ? 8 : 1;
+        const std::size_t portion = std::max<std::size_t>((left.size() + portions - 1) / portions, 512);
+        PassResult all;
+        while (left.size() > portion) {
+            all.add(model_->run(stage, in, left.first(portion)));
+            left = left.subspan(portion);
+            halo.progress();
+        }
+        all.add(model_->run(stage, in, left));
+        return all;
+    });
+    count_work(Phase::Interior, s, result.pairs, lists.interior().size());
+    timers_.timed(Phase::HaloWait, [&] { halo.arrive([&](Index slot, const std::byte* row) { model_->unpack(stage, slot, row); }); });
+    const PassResult rim = timers_.timed(Phase::Rim, [&] { return model_->run(stage, in, lists.rim()); });
+    count_work(Phase::Rim, s, rim.pairs, lists.rim().size());
+    model_->end_stage(stage);
+    result.add(rim);
+    return result;
+}
+
+Requests Simulation::end_step(double dt, PassResult result, Requests mine)
+{
+    work_.pairs += result.pairs, work_.asleep += result.asleep;
+    work_.halo_bytes += halo_bytes(), work_.messages += halo_messages();
+    if (work_.first_step.soil == 0) work_.first_step = {particles_.size(), result.pairs, ghosts(), halo_bytes(), halo_messages()};
+    work_.particle_steps += particles_.size();
+    clock_.dissipated.add(result.energy, clock_.energy_unit);
+    clock_.time = time_after(scene_, clock_, dt);
+    clock_.step += 1, work_.steps += 1;
+    clock_.dt = dt;
+    timers_.timed(Phase::Reduce, [&] {
+        constexpr std::size_t n = std::tuple_size_v<decltype(Extremes::members)>;
+        std::array<double, n + 2> all;
+        std::size_t k = 0;
+        Extremes& e = clock_.extremes = result.maxima;
+        for_each_member(e, e, [&](double& x, double&) { all[k++] = x; });
+        all[n] = mine.stop, all[n + 1] = mine.checkpoint;
+        comm_.max(std::span<double>(all));
+        k = 0;
+        for_each_member(e, e, [&](double& x, double&) { x = all[k++]; });
+        mine = {all[n] != 0, all[n + 1] != 0};
+    });
+    // Sleeping particles are not in the maxima: the step is never longer than the soil at rest allows.
+    if (scene_.accuracy.sleep_below > 0)
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+    layout_.moved(dt * std::sqrt(clock_.extremes.drift2));
+    return mine;
+}
+
+StepInput Simulation::step_input(double dt)
+{
+    StepInput in{.particles = &particles_,
+                 .lists = &layout_.lists(),
+                 .soils = soils_,
+                 .dt = dt,
+                 .kick = 0.5 * (clock_.dt + dt),
+                 .forces = {scene_.effects.gravity.value_or(Vector{}), damping()},
+                 .evolving = evolving_,
+                 .energy_unit = clock_.energy_unit,
+                 .low = scene_.space.low,
+                 .high = scene_.space.high,
+                 .sleep = sleep_stage(),
+                 .calm_speed = scene_.accuracy.sleep_below,
+                 .detection_interval = double(sleep_interval_ - 1) * dt};
+    for (int axis = 0; axis < 3; ++axis) // a periodic axis has no way out
+        if (scene_.space.periodic[axis] && in.low) {
+            const double all = std::numeric_limits<double>::infinity();
+            (axis == 0 ? in.low->x : axis == 1 ? in.low->y : in.low->z) = -all;
+            (axis == 0 ? in.high->x : axis == 1 ? in.high->y : in.high->z) = all;
+        }
+    return in;
+}
+
+double Simulation::damping() const
+{
+    const auto& d = scene_.effects.damping;
+    if (!d || clock_.time >= d->until) return 0;
+    // mu_d = ratio * 2 omega_1, omega_1 = pi c_p/(2 H): critical for the lowest mode of a column of height H
+    const auto& b = filling_.soil_bounds();
+    double c = 0;
+    for (const auto& m : soils_) c = std::max(c, m.sound_speed);
+    return d->ratio * std::numbers::pi * c / (b.high.z - b.low.z + scene_.space.spacing);
+}
+
+SleepStage Simulation::sleep_stage() const
+{
+    // Damping settles a state: there soil is slow before it is at rest.
+    if (scene_.accuracy.sleep_below == 0 || damping() > 0) return SleepStage::Off;
+    const auto phase = clock_.step % sleep_interval_;
+    return phase == 0 ? SleepStage::Detect : phase == 1 ? SleepStage::Freeze : SleepStage::Frozen;
+}
+
+void Simulation::count_work(Phase phase, const Stage& stage, std::int64_t pairs, std::size_t clusters)
+{
+    const double particles = double(clusters) / std::max<double>(1, double(layout_.lists().size())) * particles_.size();
+    timers_.did(phase, double(pairs) * stage.flops_per_pair + particles * stage.flops_per_particle, particles * stage.bytes_per_particle);
+}
+
+// ---- guard and retry -----------------------------------------------------------------------------------------------
+
+void Simulation::remember_if_good(bool rebuilt)
+{
+    if (!options_.guard || !rebuilt) return;
+    const auto remember = [&] {
+        if (scene_.time.retry) last_good_ = SavedState{particles_, clock_, work_, domain_.known()};
+    };
+    if (!last_good_) remember(); // the start of the run, or of its restart
+    if (clock_.step - clock_.inspected < 64) return;
+    timers_.timed(Phase::Guard, [&] {
+        clock_.inspected = clock_.step;
+        watch_.inspect(particles_, layout_, clock_, ledger());
+        remember();
+    });
+}
+
+bool Simulation::roll_back()
+{
+    if (!last_good_ || clock_.time <= last_failure_time_) return false;
+    last_failure_time_ = clock_.time;
+    particles_ = last_good_->particles;
+    clock_ = last_good_->clock;
+    work_ = last_good_->work;
+    clock_.base_time = clock_.time, clock_.base_step = clock_.step;
+    clock_.step_scale *= 0.5;
+    // Cuts since then have moved blocks on, further than a rank knows.
+    domain_.know_again(last_good_->known);
+    domain_.migrate(particles_);
+    rebuild(false);
+    return true;
+}
+
+// ---- what a run tells of itself ------------------------------------------------------------------------------------
+
+Ledger Simulation::ledger() const
+{
+    Ledger l;
+    l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), scene_.effects.gravity.value_or(Vector{}), water_,
+                           clock_.energy_unit * 65536);
+    auto units = over_ranks(comm_, clock_.dissipated);
+    for_each_member(l.dissipated, units, [&](double& joules, std::int64_t& u) { joules = double(u) * clock_.energy_unit; });
+    return l;
+}
+
+double Simulation::residual(const Ledger& l) const
+{
+    const double excess = l.sum() - clock_.energy_at_start;
+    const double drop = -l.state.potential;
+    const double scale =
+        drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
+    return scale > 0 ? excess / scale : 0;
+}
+
+std::int64_t Simulation::pairs() const { return comm_.sum(work_.pairs + clock_.pairs); }
+
+Clock Simulation::clock() const
+{
+    Clock c = clock_;
+    c.pairs = pairs();
+    c.dissipated = over_ranks(comm_, c.dissipated);
+    return c;
+}
+
+std::int64_t Simulation::halo_bytes() const
+{
+    const auto& halo = layout_.made_halo();
+    return halo ? halo->rows_per_refresh() * std::int64_t(row_bytes(*model_)) : 0;
+}
+int Simulation::halo_messages() const
+{
+    const auto& halo = layout_.made_halo();
+    return halo ? halo->messages_per_refresh() * int(model_->stages().size()) : 0;
+}
+
+std::size_t Simulation::memory_bytes() const
+{
+    return particles_.bytes_per_particle() * particles_.size() + layout_.bytes() + model_->bytes();
+}
+
+} // namespace kuzure

@@ -1,0 +1,124 @@
+#pragma once
+// One run in memory: the particles of this rank and the time step. Everything a user sees of it (files, messages) is made by
+// solver/app.
+#include "perf/phases.hpp"
+#include "perf/report.hpp"
+#include "solver/kernels/pair_model.hpp"
+#include "solver/run/balance.hpp"
+#include "solver/run/clock.hpp"
+#include "solver/run/layout.hpp"
+#include "solver/run/watch.hpp"
+
+namespace kuzure {
+
+/// How a run is carried out; none of it changes a bit of the result but `arithmetic` in mixed precision.
+struct RunOptions {
+    Arithmetic arithmetic = Arithmetic::Simd;
+    int recut_every = 0; // cut the domain anew at every so many list rebuilds, needed or not; 0: when it pays
+    int blocks_per_rank = default_blocks_per_rank;
+    bool guard = true; // look for trouble at list rebuilds; perf/bench/guard.cpp measures what it costs
+    /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say.
+    std::function<void(Particles&)> initial = {};
+    std::optional<scene::Filling> filling = {}; // particles of this scene, if the caller already has them
+};
+
+/// What a rank asks for after a step; travels with the step's only reduction.
+struct Requests {
+    bool stop = false, checkpoint = false;
+};
+
+class Simulation {
+public:
+    /// Fills the scene (with effects resolved). Collective. Throws BadInput.
+    Simulation(const Comm&, const Scene&, RunOptions = {});
+    /// Goes on from particles read anywhere and the clock of their checkpoint. Collective.
+    Simulation(const Comm&, const Scene&, Particles, const Clock&, RunOptions = {});
+    ~Simulation();
+
+    /// One step. Collective. Returns the requests of all ranks combined. Throws NumbersFailed on every rank together.
+    Requests step(Requests mine = {});
+    /// Length of the next step, s; 0 when the end time is reached.
+    double next_dt() const { return step_length(scene_, clock_); }
+    bool finished() const { return next_dt() == 0; }
+
+    double time() const { return clock_.time; }
+    std::int64_t steps() const { return clock_.step; }
+    double dt() const { return clock_.dt; }
+    double max_speed() const { return std::sqrt(clock_.extremes.speed2); }
+    const Particles& particles() const { return particles_; }
+    const scene::Filling& filling() const { return filling_; }
+    const Scene& scene() const { return scene_; }
+    std::span<const Material> soils() const { return soils_; }
+    const PairModel& model() const { return *model_; }
+    const Comm& comm() const { return comm_; }
+    Timers& timers() { return timers_; }
+
+    /// Collective. Back to the last state that the guard found good, to go on with half the step; only with time.retry.
+    /// False, and nothing changed, if there is none or this failure was met before.
+    bool roll_back();
+    /// Id of the particle that the last NumbersFailed named; -1 before there was one.
+    std::int64_t failed_id() const { return watch_.failed_id(); }
+
+    /// Collective: energies of now.
+    Ledger ledger() const;
+    /// (sum of energies - that at the start)/(potential drop).
+    double residual(const Ledger&) const;
+    /// Collective: the clock with everything that other ranks know summed up on every rank.
+    Clock clock() const;
+    /// Collective: pairs over all ranks since the start.
+    std::int64_t pairs() const;
+    WorkDone work_done() const { return work_; }
+
+    std::int64_t rebuilds() const { return rebuilds_; }
+    const Balance& balance() const { return balance_; }
+    const Watch::Seen& seen() const { return watch_.seen(); }
+    Index ghosts() const { return layout_.ghosts(); }
+    /// Bytes that this rank sends in a step.
+    std::int64_t halo_bytes() const;
+    int halo_messages() const;
+    /// Bytes of this rank's large arrays.
+    std::size_t memory_bytes() const;
+
+private:
+    Simulation(const Comm&, const Scene&, RunOptions, const Clock&);
+    void prepare();
+    void rebuild(bool sort_anew);
+    StepInput step_input(double dt);
+    /// 1/s, while the scene asks for it.
+    double damping() const;
+    SleepStage sleep_stage() const;
+    /// A stage over all clusters, those without ghosts while the halo travels.
+    PassResult run_stage(int stage, const StepInput&);
+    void count_work(Phase, const Stage&, std::int64_t pairs, std::size_t clusters);
+    Requests end_step(double dt, PassResult, Requests mine);
+    void remember_if_good(bool rebuilt);
+
+    const Comm& comm_;
+    Scene scene_;
+    RunOptions options_;
+    scene::Filling filling_;
+    std::vector<Material> soils_;
+    std::unique_ptr<PairModel> model_;
+    Domain domain_;
+    Layout layout_;
+    Balance balance_;
+    Watch watch_;
+    Particles particles_;
+    PoreWater water_;
+    bool evolving_ = false;
+    std::int64_t sleep_interval_ = 1; // steps between detections, where soil may sleep
+    Clock clock_;
+    WorkDone work_; // of this rank
+    std::int64_t rebuilds_ = 0;
+    struct SavedState {
+        Particles particles;
+        Clock clock;
+        WorkDone work;
+        BlockOwners known;
+    };
+    std::optional<SavedState> last_good_; // for time.retry
+    double last_failure_time_ = -1;       // s, of the last retried failure
+    Timers timers_;
+};
+
+} // namespace kuzure

@@ -1,0 +1,60 @@
+#include "solver/run/start.hpp"
+#include "solver/run/blocks.hpp"
+#include "solver/run/initial_stress.hpp"
+
+namespace kuzure {
+
+void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scene::Filling& filling, std::span<const Material> soils,
+                Particles& p)
+{
+    struct Start {
+        std::int64_t id;
+        Vector x;
+        int body;
+    };
+    std::vector<Start> start;
+    for (std::size_t k = 0; k < domain.blocks().size(); ++k) {
+        if (domain.owners()[k] != comm.rank()) continue;
+        const Block b = domain.blocks()[k];
+        filling.for_each_soil_in(box_of(domain.space(), b, 1e-6 * scene.space.spacing), [&](std::int64_t id, Vector x, int body) {
+            if (domain.block_of(x) == b) start.push_back({id, x, body});
+        });
+    }
+    domain.forget_far();
+    p.resize(Index(start.size()));
+    ensure(comm.sum(std::int64_t(start.size())) == filling.soil_count(), "the ranks together do not hold the scene's soil");
+    const InitialStress at_rest(scene, filling, soils);
+    const Index n = p.size();
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) {
+        const auto& s = start[i];
+        const auto& body = scene.bodies[s.body];
+        const Material& m = soils[body.soil];
+        Vector v = body.velocity;
+        if (scene.dimensions == 2) v.y = 0;
+        p[field::position].set(i, s.x), p[field::origin].set(i, s.x), p[field::sorted_position].set(i, s.x);
+        p[field::velocity].set(i, v);
+        p[field::density].set(i, m.density);
+        p[field::id].set(i, s.id), p[field::soil].set(i, std::int32_t(body.soil));
+        if (body.stress == scene::InitialStress::AtRest) p[field::stress].set(i, at_rest(s.x, body.soil));
+    }
+}
+
+double energy_scale(const Scene& scene, const scene::Filling& filling, std::span<const Material> soils)
+{
+    const auto& b = filling.soil_bounds();
+    const double g = length(scene.effects.gravity.value_or(Vector{}));
+    double scale = 0;
+    for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
+        const auto& body = scene.bodies[k];
+        const Material& m = soils[body.soil];
+        const double mass = m.density * scene.particle_volume() * double(filling.body_count(int(k)));
+        const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing});
+        scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.sound_speed * m.sound_speed);
+    }
+    return scale;
+}
+
+double energy_unit(double scale) { return std::exp2(std::floor(std::log2(scale)) - 58); }
+
+} // namespace kuzure

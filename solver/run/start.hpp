@@ -1,0 +1,18 @@
+#pragma once
+// The particles of a scene's start, and the energy scale of its run.
+#include "decomposition/domain.hpp"
+#include "solver/scene/fill.hpp"
+#include "solver/scene/material.hpp"
+#include "solver/scene/scene.hpp"
+
+namespace kuzure {
+
+/// Fills this rank's blocks with the scene's soil, with its velocities and initial stresses. Collective. The fields are required.
+void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
+
+/// Energy scale of a whole run, J: weight times height, or kinetic energy, or a little strain.
+double energy_scale(const Scene&, const scene::Filling&, std::span<const Material>);
+/// The unit that energies of this scale (J) are sums of: a power of two, 2^-58 of it or less.
+double energy_unit(double scale);
+
+} // namespace kuzure
