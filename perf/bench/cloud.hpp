@@ -2,6 +2,7 @@
 // A cloud of particles without a scene file: jittered lattice with smooth fields, sorted and with lists, for benchmarks
 // and for tests of the pair pass.
 #include "solver/kernels/pair_model.hpp"
+#include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
 #include <numeric>
 #include <random>
@@ -20,13 +21,15 @@ inline Scene dry_sand(double spacing = 0.04, double h = 1.2)
     return s;
 }
 
-/// n^3 particles jittered by +-jitter spacings, with smooth velocities and near-geostatic stress.
+/// n^3 particles jittered by +-jitter spacings, with smooth velocities and near-geostatic stress; beside them all points of
+/// the scene's walls, which may reach into the cloud.
 struct Cloud {
     Scene scene;
     Columns columns;
     Particles particles;
     ColumnSort sorted;
     ClusterLists lists;
+    std::vector<WallPoints> walls;
     std::vector<Material> soils;
 
     Cloud(int n, double jitter, const Scene& s = dry_sand(), unsigned seed = 1) : scene(s)
@@ -58,6 +61,16 @@ struct Cloud {
                     p[field::stress].set(i, sigma);
                     p[field::id].set(i, std::int64_t(i));
                 }
+        for (int w = 0; w < int(s.walls.size()); ++w) {
+            const scene::Lattice lattice(s.walls[std::size_t(w)].shape, dx, s.dimensions);
+            auto& points = walls.emplace_back();
+            points.wall = w;
+            for (std::int64_t k = 0; k < lattice.size(); ++k) {
+                const Vector x = lattice.position(k);
+                points.x.push_back(x.x), points.y.push_back(x.y), points.z.push_back(x.z), points.id.push_back(k);
+            }
+            points.sort(columns);
+        }
     }
 
     void sort()
@@ -74,7 +87,7 @@ struct Cloud {
                                  &sorted,     particles.size()};
         static const ColumnSort none{.start = {0}};
         const SortedPoints ghosts{.columns = &none};
-        lists.build(columns, owned, ghosts, {}, scene.support() * (1 + skin), width);
+        lists.build(columns, owned, ghosts, walls, scene.support() * (1 + skin), width);
     }
 
     /// What a step of length dt asks of a model; the kick alike.
@@ -85,7 +98,7 @@ struct Cloud {
         for (const auto& m : soils) in.evolving = in.evolving || m.evolves();
         return in;
     }
-    /// Sorted, with lists for a model and its records.
+    /// Sorted, with lists for a model, its records and walls; the cloud may not move while the model is used.
     void prepare(PairModel& model, double skin)
     {
         model.require_fields(particles);
@@ -93,6 +106,7 @@ struct Cloud {
         sort();
         build(model.cluster_width(), skin);
         model.make_records(particles, soils, {});
+        model.place_walls(scene.walls, walls);
     }
     /// All stages of one step over all clusters.
     PassResult step(PairModel& model, const StepInput& in)

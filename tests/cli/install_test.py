@@ -20,7 +20,7 @@ add_executable(scene_only scene.cpp)
 target_link_libraries(scene_only PRIVATE kuzure::scene)
 """
 # A stress far outside the cone comes back onto it; a model of the pair pass is chosen and named.
-SOLVER = """#include <solver/kernels/step.hpp>
+SOLVER = """#include <solver/kernels/pair_model.hpp>
 #include <solver/physics/drucker_prager.hpp>
 #include <solver/scene/scene.hpp>
 #include <cstdio>
@@ -32,7 +32,7 @@ int main()
     const auto law = kuzure::Elastoplastic<double>::from(kuzure::Material::from(s.soils[0]));
     const kuzure::Stress trial{-3e3, -1e3, -9e3, 2e3, 0, 5e2};
     const auto back = kuzure::return_to_cone(trial, law);
-    const auto model = kuzure::choose_model(s, kuzure::Arithmetic::Lanes);
+    const auto model = kuzure::choose_model(s, kuzure::Arithmetic::Simd);
     const double out = kuzure::yield_function(trial, law), on = kuzure::yield_function(back.sigma, law);
     std::printf("%s outside %g, on the cone %g, work %g\\n", model->name().c_str(), out, on, back.work);
     return out > 100 && on < 1e-9 && on > -1e-9 && back.work > 0 && model->cluster_width() > 0 ? 0 : 1;

@@ -57,7 +57,7 @@ def executed(path):
     skip = False
     for line in open(path, errors="replace"):
         if line.startswith("fn="):
-            inside = "kuzure::Compiled<" in line and "::over(" in line and "_omp_fn" in line
+            inside = "kuzure::ClusterPass<" in line and "::over<" in line and "_omp_fn" in line
         elif line.startswith("calls="):
             skip = True  # the next line is what the called function cost
         elif inside and line.startswith("0x"):

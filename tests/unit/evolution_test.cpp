@@ -1,6 +1,6 @@
 // What changes the cone during a run, at one material point: softening, dilation decay, mu(I), still pore water.
+#include "solver/effects/pore_water.hpp"
 #include "solver/physics/drucker_prager.hpp"
-#include "solver/effects/artificial_stress.hpp"
 #include "solver/scene/scene.hpp"
 #include <gtest/gtest.h>
 

@@ -77,10 +77,18 @@ inline std::string periodic(double width, double low, double high, const char* a
     return fmt::format("low = [0.0, 0.0, {}]\nhigh = [{}, {}, {}]\nperiodic = [{}]", low, width, width, high, axes);
 }
 
-// ---- initial fields, on all of a field's twins ----
+// ---- initial fields, on all of a field's twins that the scheme has ----
 
-inline void set_velocity(Particles& p, Index i, Vector v) { p[field::velocity].set(i, v), p[field::half_velocity].set(i, v); }
-inline void set_stress(Particles& p, Index i, const Stress& s) { p[field::stress].set(i, s), p[field::half_stress].set(i, s); }
+inline void set_velocity(Particles& p, Index i, Vector v)
+{
+    p[field::velocity].set(i, v);
+    if (p.has(field::half_velocity)) p[field::half_velocity].set(i, v);
+}
+inline void set_stress(Particles& p, Index i, const Stress& s)
+{
+    p[field::stress].set(i, s);
+    if (p.has(field::half_stress)) p[field::half_stress].set(i, s);
+}
 inline void set_position(Particles& p, Index i, Vector x)
 {
     p[field::position].set(i, x), p[field::origin].set(i, x), p[field::sorted_position].set(i, x);
