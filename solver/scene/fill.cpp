@@ -179,7 +179,7 @@ double Lattice::rows(const Shape& shape, double spacing, int dimensions)
     return (outer.high.z - outer.low.z) / spacing * (dimensions == 2 ? 1 : (outer.high.y - outer.low.y) / spacing);
 }
 
-Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimensions_(dimensions), spacing_(spacing)
+Lattice::Lattice(const Shape& shape, double spacing, int dimensions, Vector least) : dimensions_(dimensions), spacing_(spacing)
 {
     on_face_ = std::max(on_the_face * spacing, rounding_of(shape, dimensions));
     near_ = std::max(tolerance * spacing, 4 * on_face_);
@@ -272,6 +272,7 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions) : dimension
             layer_id_.push_back(layer_id_.back() + in_layer);
         }
     }
+    x_.least = least.x, y_.least = least.y, z_.least = least.z;
     size_ = stride_z_ ? layer_id_.back() : count(z_.range) > 0 ? count(z_.range) * layer_id_[1] : 0;
 
     if (size_ == 0) return;
@@ -414,7 +415,16 @@ Filling::Survey Filling::survey(const Scene& scene)
             issues.push_back({Severity::Error, p.key, std::move(p.problem), {}});
             continue;
         }
-        p.lattice.emplace(*p.shape, scene.space.spacing, dimensions);
+        // Bodies lie within the space, walls within its periods: no point of theirs may lie on the other side by rounding.
+        Vector least = Lattice::nowhere;
+        if (scene.space.low) {
+            const bool body = &p < pieces.data() + scene.bodies.size();
+            const auto& periodic = scene.space.periodic;
+            if (body || periodic[0]) least.x = scene.space.low->x;
+            if (body || periodic[1]) least.y = scene.space.low->y;
+            if (body || periodic[2]) least.z = scene.space.low->z;
+        }
+        p.lattice.emplace(*p.shape, scene.space.spacing, dimensions, least);
         if (p.lattice->size() == 0)
             issues.push_back({Severity::Error,
                               p.key,

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -33,8 +34,11 @@ struct GridPart {
 /// local ids: z slowest, then y, then x. Boxes keep three numbers; other shapes keep, for every row along x, the intervals inside.
 class Lattice {
 public:
-    /// Throws Broken if the shape cannot be filled: ask problem() first.
-    Lattice(const Shape&, double spacing, int dimensions);
+    /// Throws Broken if the shape cannot be filled: ask problem() first. No coordinate (m) is below `least`, where a shape ends: a point
+    /// on that face may be so by rounding.
+    Lattice(const Shape&, double spacing, int dimensions, Vector least = nowhere);
+    static constexpr Vector nowhere{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+                                    -std::numeric_limits<double>::infinity()};
     /// Why the shape cannot be filled with whole lattice points, or empty.
     static std::string problem(const Shape&, double spacing, int dimensions);
     /// At most so many rows along x are kept for a shape.
@@ -76,8 +80,9 @@ private:
     struct Axis {
         double origin = 0;
         Range range{0, 0};
+        double least = -std::numeric_limits<double>::infinity(); // m
     };
-    double coordinate(const Axis& a, std::int64_t k) const { return lattice_coordinate(a.origin, k, spacing_); }
+    double coordinate(const Axis& a, std::int64_t k) const { return std::max(lattice_coordinate(a.origin, k, spacing_), a.least); }
     double y_of(std::int64_t k) const { return dimensions_ == 2 ? 0.0 : coordinate(y_, k); }
     /// Indices of an axis whose coordinates lie in the closed interval low .. high.
     Range within(const Axis&, double low, double high) const;

@@ -159,3 +159,18 @@ TEST(PoreWater, ASubmergedColumnRestsOnItsBuoyantWeight)
         EXPECT_LT(fastest, 0.03) << "m/s, of 4 m/s in free fall";
     }
 }
+
+// A polygon's faces on lattice points at the ends of a period: each particle belongs to one rank, by the face of the lower end.
+TEST(Filling, FacesOnTheEndsOfAPeriodAreHeldOnce)
+{
+    SceneText t;
+    t.end = "0.004";
+    t.space = "low = [-1.0, -0.14, -1.0]\nhigh = [2.0, 0.14, 1.0]\nperiodic = [\"y\"]";
+    t.bodies = "[[body]]\nsoil = \"s\"\npolygon = { points = [[0, 0.02], [0.8, 0.02], [0.8, 0.34], [0, 0.34]], y = [-0.14, 0.14] }\n"
+               "velocity = [0.0, 1.0, 0.0]\n";
+    t.walls = "[[wall]]\npolygon = { points = [[-0.2, -0.2], [1.0, -0.2], [1.0, 0.02], [-0.2, 0.02]], y = [-0.14, 0.14] }\n";
+    Simulation sim(world(), t.scene());
+    EXPECT_EQ(world().sum(std::int64_t(sim.particles().size())), 20 * 7 * 8);
+    while (!sim.finished()) sim.step();
+    EXPECT_EQ(world().sum(std::int64_t(sim.particles().size())), 20 * 7 * 8);
+}

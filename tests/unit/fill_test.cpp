@@ -513,6 +513,33 @@ TEST(FillOfCuts, AcrossAPeriod)
         }
 }
 
+// Points on the lower face of the space are in it, not an ulp outside, where they would belong to the other end of the period.
+TEST(FillOfCuts, NoPointLiesOutsideTheSpaceByRounding)
+{
+    int on_the_face = 0;
+    for (const double dx : {0.1, 0.07, 1.0 / 3})
+        for (int n = -40; n < 40; ++n) {
+            const double low = std::stod(fmt::format("{:.14g}", (n + 0.5) * dx)), high = low + 9 * dx; // as a file has it
+            Scene s = made(dx, {Polygon{{{low, low}, {high, low}, {high, high}, {low, high}}, {low, high}}},
+                           {Polygon{{{low - 3 * dx, low - 3 * dx}, {high, low - 3 * dx}, {high, low}, {low - 3 * dx, low}}, {low, high}}});
+            s.space.low = Vector{low, low, low}, s.space.high = Vector{high, high, high};
+            s.space.periodic[1] = true;
+            const Filling filling(s);
+            EXPECT_EQ(filling.soil_count(), 9 * 9 * 9);
+            EXPECT_EQ(filling.wall_count(), 12 * 3 * 9);
+            for (const auto& p : soil_in(filling, everywhere)) {
+                ASSERT_GE(p.x.x, low);
+                ASSERT_GE(p.x.y, low);
+                ASSERT_GE(p.x.z, low);
+                ASSERT_EQ(filling.soil_position(p.id), p.x);
+                on_the_face += p.x.y == low;
+            }
+            for (const auto& p : walls_in(filling, everywhere)) ASSERT_GE(p.x.y, low);
+            EXPECT_EQ(filling.soil_count_in({{low, low, low}, {high, high, high}}), 9 * 9 * 9);
+        }
+    EXPECT_GT(on_the_face, 1000);
+}
+
 namespace {
 Shape shifted(Shape shape, Vector by)
 {
