@@ -73,6 +73,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin) # a program without mpirun starts its daemon, too
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "fonts-ipafont-gothic | fonts-noto-cjk") # Japanese titles of pictures
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "paraview, ffmpeg")
 set(CPACK_STRIP_FILES ON)
 include(CPack)

@@ -2,246 +2,286 @@
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
+#include <csetjmp>
+#include <cstdlib>
 #include <fmt/format.h>
+#include <mutex>
+#include <numbers>
 #include <png.h>
+#if KUZURE_PICTURES
+#include <pango/pangocairo.h>
+#endif
 
 namespace kuzure::io {
+
+Canvas::Canvas(int width, int height, Rgb background) : width_(width), height_(height)
+{
+    if (!can_draw())
+        throw BadInput("this kuzure was built without Cairo and Pango and draws no pictures. Remedy: build it where they are "
+                       "(jobs/install.sh), or draw there from this run's snapshots: kuzure picture DIR");
+    pixels_.assign(std::size_t(width) * std::size_t(height),
+                   0xff000000u | std::uint32_t(background.r) << 16 | std::uint32_t(background.g) << 8 | std::uint32_t(background.b));
+}
+
+#if KUZURE_PICTURES
 namespace {
 
-// ---- the letters
-// ----------------------------------------------------------------------------------------------------- Drawn
-// with a round pen. A point is two hexadecimal digits x y; the base line is y = 3, small letters reach 9,
-// capitals c. A stroke is straight from point to point; after '~' it is a smooth curve along them, after '@'
-// a closed one. Order: ASCII 32 to 126.
-constexpr const char* glyphs[95] = {
-    "",                              // space
-    "0c06 03",                       // !
-    "0c0a 2c2a",                     // "
-    "132c 435c 0666 0969",           // #
-    "~6a6c0c0867630305 3e31",        // $
-    "037c @0c3c3909 @46767343",      // %
-    "~631a2d5b06025266",             // &
-    "0c0a",                          // '
-    "~2e0b0421",                     // (
-    "~0e2b2401",                     // )
-    "3b35 0a56 065a",                // *
-    "0767 3a34",                     // +
-    "2402",                          // ,
-    "0747",                          // -
-    "1314",                          // .
-    "025d",                          // /
-    "@0c6c696663030609",             // 0
-    "1a3c33",                        // 1
-    "~0a0c6c6803 0363",              // 2
-    "~0b0c6c6838 ~3868630304",       // 3
-    "535c0676",                      // 4
-    "6c0c08 ~0869630304",            // 5
-    "@08686303 ~5c0c0805",           // 6
-    "0c6c23",                        // 7
-    "@1c5c5818 @08686303",           // 8
-    "@0c6c6707 ~6a676313",           // 9
-    "13 19",                         // :
-    "2402 29",                       // ;
-    "590755",                        // <
-    "0868 0565",                     // =
-    "095705",                        // >
-    "~0a0c6c683836 33",              // ?
-    "~75530307090c9c9666566a2a2666", // @
-    "033c63 1656",                   // A
-    "0c03 ~0c6c6808 ~08787303",      // B
-    "~6a6c0c0906036365",             // C
-    "030c ~0c7c79767303",            // D
-    "6c0c0363 0858",                 // E
-    "6c0c03 0858",                   // F
-    "~6a6c0c0906036367 6737",        // G
-    "0c03 6c63 0868",                // H
-    "0c03",                          // I
-    "~5c5653030305",                 // J
-    "0c03 6c06 2863",                // K
-    "0c0363",                        // L
-    "030c468c83",                    // M
-    "030c737c",                      // N
-    "@0c8c898683030609",             // O
-    "030c ~0c7c7707",                // P
-    "@0c8c898683030609 5682",        // Q
-    "030c ~0c7c7707 3773",           // R
-    "~6a6c0c0867630305",             // S
-    "0c6c 3c33",                     // T
-    "~0c060363666c",                 // U
-    "0c336c",                        // V
-    "0c234b638c",                    // W
-    "0c63 6c03",                     // X
-    "0c376c 3733",                   // Y
-    "0c6c0363",                      // Z
-    "2e0e0121",                      // [
-    "0d52",                          // backslash
-    "0e2e2101",                      // ]
-    "0a2c4a",                        // ^
-    "0262",                          // _
-    "0c1a",                          // `
-    "@09595303 5953",                // a
-    "0c03 @09595303",                // b
-    "~585909035354",                 // c
-    "5c53 @09595303",                // d
-    "0656 ~565909035354",            // e
-    "~4c1c1913 0939",                // f
-    "@09595303 ~5953500001",         // g
-    "0c03 ~0609595653",              // h
-    "0903 0c",                       // i
-    "~2923200001 2c",                // j
-    "0c03 4905 2643",                // k
-    "0c03",                          // l
-    "0903 ~0609494643 ~4649898683",  // m
-    "0903 ~0609595653",              // n
-    "@09595303",                     // o
-    "0900 @09595303",                // p
-    "5950 @09595303",                // q
-    "0903 ~060949",                  // r
-    "~5859090656530304",             // s
-    "~1c151343 0939",                // t
-    "~0906035356 5953",              // u
-    "093359",                        // v
-    "0923486389",                    // w
-    "0953 5903",                     // x
-    "0933 6920",                     // y
-    "09590353",                      // z
-    "~2e1d1a08 ~07151221",           // {
-    "0e01",                          // |
-    "~0e1d1a28 ~27151201",           // }
-    "~0617486967",                   // ~
+// One map of fonts for the program: finding the fonts takes longer than drawing. Pango's objects are not for several threads at once.
+std::mutex pango;
+
+template <class T, void (*close)(T*)> struct Closer {
+    void operator()(T* t) const { close(t); }
 };
-constexpr const char* unknown_glyph = "0c6c63030c";
-constexpr double capital = 9, gap = 2.6, space_width = 4; // in units of the digits
-
-struct Point {
-    double x, y;
+using Surface = std::unique_ptr<cairo_surface_t, Closer<cairo_surface_t, cairo_surface_destroy>>;
+using Pen = std::unique_ptr<cairo_t, Closer<cairo_t, cairo_destroy>>;
+struct Unref {
+    void operator()(void* object) const { g_object_unref(object); }
 };
-using Stroke = std::vector<Point>;
+using Layout = std::unique_ptr<PangoLayout, Unref>;
 
-int digit(char c) { return c <= '9' ? c - '0' : c - 'a' + 10; }
-
-/// Quadratic spline along the corners, by cutting them three times (Chaikin).
-Stroke smooth(Stroke s, bool closed)
-{
-    for (int round = 0; round < 3; ++round) {
-        Stroke finer;
-        const std::size_t n = s.size();
-        if (!closed) finer.push_back(s.front());
-        for (std::size_t i = 0; i + (closed ? 0 : 1) < n; ++i) {
-            const Point a = s[i], b = s[(i + 1) % n];
-            finer.push_back({0.75 * a.x + 0.25 * b.x, 0.75 * a.y + 0.25 * b.y});
-            finer.push_back({0.25 * a.x + 0.75 * b.x, 0.25 * a.y + 0.75 * b.y});
-        }
-        if (!closed) finer.push_back(s.back());
-        s = std::move(finer);
+struct Drawing {
+    Surface surface;
+    Pen pen;
+    Drawing(std::uint32_t* pixels, int width, int height)
+        : surface(
+              cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(pixels), CAIRO_FORMAT_RGB24, width, height, 4 * width)),
+          pen(cairo_create(surface.get()))
+    {
     }
-    if (closed) s.push_back(s.front());
+    operator cairo_t*() const { return pen.get(); }
+    void color(Rgb c) const { cairo_set_source_rgb(pen.get(), c.r / 255.0, c.g / 255.0, c.b / 255.0); }
+};
+
+/// A line of text laid out, whatever the settings of the desk it is drawn at. The lock is held.
+Layout laid_out(double size, const std::string& text)
+{
+    static PangoFontMap* const fonts = pango_cairo_font_map_new();
+    static PangoContext* const context = [] {
+        PangoContext* c = pango_font_map_create_context(fonts);
+        cairo_font_options_t* options = cairo_font_options_create();
+        cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
+        cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_SLIGHT);
+        cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
+        pango_cairo_context_set_font_options(c, options);
+        cairo_font_options_destroy(options);
+        pango_cairo_context_set_resolution(c, 72);
+        return c;
+    }();
+    // Han letters have one code and several shapes, and nothing in a text says which are meant. Numbers look the same beside any title.
+    const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 128; });
+    const char* locale = std::getenv("LANG");
+    const std::string_view spoken = locale ? locale : "";
+    const char* language = ascii ? "en" : spoken.starts_with("zh") ? "zh" : spoken.starts_with("ko") ? "ko" : "ja";
+    pango_context_set_language(context, pango_language_from_string(language));
+    Layout layout(pango_layout_new(context));
+    PangoFontDescription* font = pango_font_description_from_string("sans-serif");
+    pango_font_description_set_absolute_size(font, size * PANGO_SCALE);
+    pango_layout_set_font_description(layout.get(), font);
+    pango_font_description_free(font);
+    pango_layout_set_single_paragraph_mode(layout.get(), true);
+    pango_layout_set_text(layout.get(), text.data(), int(text.size()));
+    return layout;
+}
+
+bool known(const std::string& text) { return pango_layout_get_unknown_glyphs_count(laid_out(16, text).get()) == 0; }
+
+/// Valid UTF-8, without control characters: Pango accepts nothing else.
+std::string printable(const std::string& text)
+{
+    gchar* valid = g_utf8_make_valid(text.data(), gssize(text.size()));
+    std::string s = valid;
+    g_free(valid);
+    for (char& c : s)
+        if (static_cast<unsigned char>(c) < 32 || c == 127) c = ' ';
     return s;
 }
 
-std::vector<Stroke> strokes_of(std::string_view glyph)
+template <class F> void for_each_letter(const std::string& text, F f)
 {
-    std::vector<Stroke> all;
-    for (std::size_t i = 0; i < glyph.size();) {
-        const auto end = std::min(glyph.find(' ', i), glyph.size());
-        const char kind = glyph[i];
-        if (kind == '~' || kind == '@') ++i;
-        Stroke s;
-        for (; i + 1 < end; i += 2) s.push_back({double(digit(glyph[i])), double(digit(glyph[i + 1]) - 3)});
-        if (kind == '~' || kind == '@') s = smooth(s, kind == '@');
-        all.push_back(std::move(s));
-        i = end + 1;
-    }
-    return all;
+    for (const char *at = text.c_str(), *next; *at; at = next) next = g_utf8_next_char(at), f(std::string(at, next));
 }
 
-double advance(const char* glyph)
+/// The text with a box for every letter without a font. Pango would show the code in a box, too small to read. The lock is held.
+std::string with_boxes(const std::string& given)
 {
-    double width = -1;
-    for (const auto& s : strokes_of(glyph))
-        for (const Point p : s) width = std::max(width, p.x);
-    return (width < 0 ? space_width : width) + gap;
-}
-
-template <class F> void for_each_glyph(std::string_view text, F f)
-{
-    for (const char c : text) {
-        const auto u = static_cast<unsigned char>(c);
-        if ((u & 0xc0) == 0x80) continue; // the rest of a letter in several bytes
-        f(u >= 32 && u < 127 ? glyphs[u - 32] : unknown_glyph);
-    }
+    const std::string text = printable(given);
+    if (known(text)) return text;
+    const std::string box = known("\u25a1") ? "\u25a1" : "?";
+    std::string out;
+    for_each_letter(text, [&](const std::string& letter) { out += known(letter) ? letter : box; });
+    return out;
 }
 
 } // namespace
 
-Canvas::Canvas(int width, int height, Rgb background)
-    : width_(width), height_(height), pixels_(std::size_t(width) * std::size_t(height), background)
-{
-}
+bool can_draw() { return true; }
 
-void Canvas::blend(int x, int y, double cover, Rgb c)
+void Canvas::rectangle(double x, double y, double width, double height, Rgb c)
 {
-    if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
-    Rgb& p = at(x, y);
-    const auto mixed = [&](std::uint8_t a, std::uint8_t b) { return std::uint8_t(std::lround(a + (b - a) * cover)); };
-    p = {mixed(p.r, c.r), mixed(p.g, c.g), mixed(p.b, c.b)};
-}
-
-void Canvas::rectangle(int x, int y, int width, int height, Rgb c)
-{
-    for (int b = y; b < y + height; ++b)
-        for (int a = x; a < x + width; ++a) blend(a, b, 1, c);
+    const Drawing d(pixels_.data(), width_, height_);
+    d.color(c);
+    cairo_rectangle(d, x, y, width, height);
+    cairo_fill(d);
 }
 
 void Canvas::line(double x0, double y0, double x1, double y1, double thickness, Rgb c)
 {
-    const double reach = 0.5 * thickness + 1, dx = x1 - x0, dy = y1 - y0, l2 = dx * dx + dy * dy;
-    for (int y = int(std::floor(std::min(y0, y1) - reach)); y <= std::max(y0, y1) + reach; ++y)
-        for (int x = int(std::floor(std::min(x0, x1) - reach)); x <= std::max(x0, x1) + reach; ++x) {
-            const double px = x + 0.5 - x0, py = y + 0.5 - y0;
-            const double s = l2 > 0 ? std::clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0;
-            const double cover = 0.5 * thickness + 0.5 - std::hypot(px - s * dx, py - s * dy);
-            if (cover > 0) blend(x, y, std::min(cover, 1.0), c);
+    const Drawing d(pixels_.data(), width_, height_);
+    d.color(c);
+    cairo_set_line_width(d, thickness);
+    cairo_move_to(d, x0, y0);
+    cairo_line_to(d, x1, y1);
+    cairo_stroke(d);
+}
+
+void Canvas::ring(double x, double y, double radius, double thickness, Rgb c)
+{
+    const Drawing d(pixels_.data(), width_, height_);
+    d.color(c);
+    cairo_set_line_width(d, thickness);
+    cairo_arc(d, x, y, radius, 0, 2 * std::numbers::pi);
+    cairo_stroke(d);
+}
+
+void Canvas::triangle(std::array<std::array<double, 2>, 3> corners, Rgb c)
+{
+    const Drawing d(pixels_.data(), width_, height_);
+    d.color(c);
+    for (const auto& p : corners) cairo_line_to(d, p[0], p[1]);
+    cairo_close_path(d);
+    cairo_fill(d);
+}
+
+double Canvas::text_width(double size, const std::string& text)
+{
+    const std::lock_guard lock(pango);
+    PangoRectangle box;
+    pango_layout_get_extents(laid_out(size, with_boxes(text)).get(), nullptr, &box);
+    return double(box.width) / PANGO_SCALE;
+}
+
+std::string Canvas::letters_missing(const std::string& given)
+{
+    const std::lock_guard lock(pango);
+    const std::string text = printable(given);
+    std::string missing;
+    if (known(text)) return missing;
+    for_each_letter(text, [&](const std::string& letter) {
+        if (!known(letter) && missing.find(letter) == std::string::npos) missing += letter;
+    });
+    return missing;
+}
+
+void Canvas::text(double x, double y, double size, const std::string& text, Rgb c, Anchor anchor, double most, bool upright)
+{
+    const std::lock_guard lock(pango);
+    const Layout layout = laid_out(size, with_boxes(text));
+    PangoRectangle box;
+    pango_layout_get_extents(layout.get(), nullptr, &box);
+    if (most > 0 && double(box.width) / PANGO_SCALE > most) {
+        pango_layout_set_ellipsize(layout.get(), PANGO_ELLIPSIZE_END);
+        pango_layout_set_width(layout.get(), int(most * PANGO_SCALE));
+        pango_layout_get_extents(layout.get(), nullptr, &box);
+    }
+    const double width = double(box.width) / PANGO_SCALE, height = double(box.height) / PANGO_SCALE;
+    const double back = anchor == Anchor::Left ? 0 : anchor == Anchor::Middle ? 0.5 * width : width;
+    const Drawing d(pixels_.data(), width_, height_);
+    cairo_translate(d, x, y);
+    if (upright) cairo_rotate(d, -0.5 * std::numbers::pi);
+    cairo_move_to(d, -back, -0.5 * height);
+    pango_cairo_layout_path(d, layout.get());
+    cairo_set_line_join(d, CAIRO_LINE_JOIN_ROUND);
+    cairo_set_line_width(d, 3);
+    d.color({255, 255, 255});
+    cairo_stroke(d);
+    cairo_move_to(d, -back, -0.5 * height);
+    d.color(c);
+    pango_cairo_show_layout(d, layout.get());
+}
+
+#else
+
+bool can_draw() { return false; }
+void Canvas::rectangle(double, double, double, double, Rgb) {}
+void Canvas::line(double, double, double, double, double, Rgb) {}
+void Canvas::ring(double, double, double, double, Rgb) {}
+void Canvas::triangle(std::array<std::array<double, 2>, 3>, Rgb) {}
+void Canvas::text(double, double, double, const std::string&, Rgb, Anchor, double, bool) {}
+double Canvas::text_width(double, const std::string&) { return 0; }
+std::string Canvas::letters_missing(const std::string&) { return {}; }
+
+#endif
+
+// ---- few colours -----------------------------------------------------------------------------------------------------------
+Palette::Palette(std::vector<Rgb> colors) : colors_(std::move(colors)), nearest_(32 * 32 * 32)
+{
+    ensure(!colors_.empty() && colors_.size() <= 256, "a palette has 1 to 256 colours");
+    std::vector<int> red, green, blue;
+    for (const Rgb c : colors_) red.push_back(c.r), green.push_back(c.g), blue.push_back(c.b);
+    const int n = int(colors_.size());
+#pragma omp parallel for schedule(static)
+    for (int code = 0; code < int(nearest_.size()); ++code) {
+        // The ends of five bits stand for black and white.
+        const int r = (code >> 10) * 255 / 31, g = (code >> 5 & 31) * 255 / 31, b = (code & 31) * 255 / 31;
+        int best = 1 << 30; // the distance as eyes weigh it, at most 585,225, above the number
+        for (int k = 0; k < n; ++k) {
+            const int dr = r - red[std::size_t(k)], dg = g - green[std::size_t(k)], db = b - blue[std::size_t(k)];
+            best = std::min(best, (2 * dr * dr + 4 * dg * dg + 3 * db * db) << 8 | k);
         }
-}
-
-double Canvas::text_width(double size, std::string_view text)
-{
-    double width = -gap;
-    for_each_glyph(text, [&](const char* g) { width += advance(g); });
-    return std::max(width, 0.0) * size / capital;
-}
-
-void Canvas::text(double x, double y, double size, std::string_view text, Rgb color, Anchor anchor)
-{
-    const double unit = size / capital, pen = std::max(0.13 * size, 1.2);
-    if (anchor != Anchor::Left) x -= text_width(size, text) * (anchor == Anchor::Middle ? 0.5 : 1.0);
-    for (const bool rim : {true, false}) {
-        double at = x;
-        for_each_glyph(text, [&](const char* g) {
-            for (const auto& s : strokes_of(g))
-                for (std::size_t i = 0; i == 0 || i + 1 < s.size(); ++i) {
-                    const Point a = s[i], b = s[std::min(i + 1, s.size() - 1)];
-                    line(at + unit * a.x, y - unit * a.y, at + unit * b.x, y - unit * b.y, rim ? pen + 3 : pen,
-                         rim ? Rgb{255, 255, 255} : color);
-                }
-            at += unit * advance(g);
-        });
+        nearest_[std::size_t(code)] = std::uint8_t(best & 255);
     }
 }
 
-std::string Canvas::png() const
+void Reduced::take(const Canvas& canvas, const Palette& palette, Area a)
 {
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    image.width = png_uint_32(width_);
-    image.height = png_uint_32(height_);
-    image.format = PNG_FORMAT_RGB;
-    png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
-    std::string out(bytes, '\0');
-    if (!png_image_write_to_memory(&image, out.data(), &bytes, 0, pixels_.data(), 0, nullptr))
-        throw IoFailed(fmt::format("making a PNG picture failed: {}", image.message));
-    out.resize(bytes);
+    ensure(canvas.width() == width && canvas.height() == height, "two pictures of different sizes");
+    const int x0 = std::max(a.x, 0), x1 = std::min(a.x + a.width, width), y1 = std::min(a.y + a.height, height);
+    for (int y = std::max(a.y, 0); y < y1; ++y) {
+        const std::uint32_t* from = canvas.row(y);
+        std::uint8_t* to = &index[std::size_t(y) * std::size_t(width)];
+        for (int x = x0; x < x1; ++x) to[x] = palette.nearest(from[x]);
+    }
+}
+
+Reduced reduce(const Canvas& canvas, const Palette& palette)
+{
+    Reduced r{canvas.width(), canvas.height(), std::vector<std::uint8_t>(std::size_t(canvas.width()) * std::size_t(canvas.height()))};
+    r.take(canvas, palette, {0, 0, r.width, r.height});
+    return r;
+}
+
+std::string png(const Reduced& picture, const Palette& palette)
+{
+    std::string out, trouble;
+    out.reserve(picture.index.size() / 8);
+    const auto failed = [](png_structp p, png_const_charp why) {
+        *static_cast<std::string*>(png_get_error_ptr(p)) = why;
+        png_longjmp(p, 1);
+    };
+    png_structp write = png_create_write_struct(PNG_LIBPNG_VER_STRING, &trouble, failed, [](png_structp, png_const_charp) {});
+    png_infop info = write ? png_create_info_struct(write) : nullptr;
+    std::vector<png_color> colors;
+    for (const Rgb c : palette.colors()) colors.push_back({c.r, c.g, c.b});
+    if (!info || setjmp(png_jmpbuf(write))) {
+        png_destroy_write_struct(&write, &info);
+        throw IoFailed(fmt::format("making a PNG picture failed: {}", trouble.empty() ? "no memory" : trouble));
+    }
+    png_set_write_fn(
+        write, &out,
+        [](png_structp p, png_bytep data, std::size_t n) {
+            static_cast<std::string*>(png_get_io_ptr(p))->append(reinterpret_cast<const char*>(data), n);
+        },
+        [](png_structp) {});
+    png_set_IHDR(write, info, png_uint_32(picture.width), png_uint_32(picture.height), 8, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_PLTE(write, info, colors.data(), int(colors.size()));
+    png_set_filter(write, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
+    png_set_compression_level(write, 1);
+    png_set_compression_buffer_size(write, 1 << 18);
+    png_write_info(write, info);
+    for (int y = 0; y < picture.height; ++y) png_write_row(write, &picture.index[std::size_t(y) * std::size_t(picture.width)]);
+    png_write_end(write, info);
+    png_destroy_write_struct(&write, &info);
     return out;
 }
 

@@ -83,7 +83,9 @@ std::string cause(const Path& path, int error)
     return words;
 }
 
-void write_atomically(const Path& path, std::string_view content)
+namespace {
+
+void write_beside_and_rename(const Path& path, std::string_view content, bool to_the_disk)
 {
     const Path beside = path.string() + ".tmp";
     int error = 0;
@@ -99,15 +101,21 @@ void write_atomically(const Path& path, std::string_view content)
             }
             content.remove_prefix(std::size_t(n));
         }
-        if (!error && ::fsync(out.fd) != 0) error = errno;
+        if (!error && to_the_disk && ::fsync(out.fd) != 0) error = errno;
     }
     if (error) {
         ::unlink(beside.c_str());
         fail(path, "writing", error);
     }
     move_file(beside, path);
-    sync(directory_of(path));
+    if (to_the_disk) sync(directory_of(path));
 }
+
+} // namespace
+
+void write_atomically(const Path& path, std::string_view content) { write_beside_and_rename(path, content, true); }
+
+void write_lightly(const Path& path, std::string_view content) { write_beside_and_rename(path, content, false); }
 
 std::string read_text(const Path& path, std::uint64_t limit)
 {

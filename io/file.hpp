@@ -29,6 +29,9 @@ std::string cause(const Path&, int error);
 /// The file gets this content or keeps what it had: written beside it, synced, renamed. Throws IoFailed.
 void write_atomically(const Path&, std::string_view content);
 
+/// The same without waiting for the disk: for what can be made again from other files. Throws IoFailed.
+void write_lightly(const Path&, std::string_view content);
+
 /// The whole file, at most `limit` bytes. Throws IoFailed.
 std::string read_text(const Path&, std::uint64_t limit = std::uint64_t(1) << 30);
 

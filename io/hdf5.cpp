@@ -287,6 +287,24 @@ bool H5Reader::has(const std::string& name) const
     }
 }
 
+std::vector<std::string> H5Reader::names(const std::string& group) const
+{
+    std::vector<std::string> all;
+    hsize_t at = 0;
+    const auto take = [](hid_t, const char* name, const H5L_info_t*, void* out) -> herr_t {
+        static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+        return 0;
+    };
+    if (!has(group) || H5Literate_by_name(id_, group.c_str(), H5_INDEX_NAME, H5_ITER_INC, &at, take, &all, H5P_DEFAULT) < 0)
+        refuse(fmt::format("group {} is missing or damaged", group));
+    return all;
+}
+
+bool H5Reader::has_attribute(const std::string& object, const std::string& attribute) const
+{
+    return H5Aexists_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT) > 0;
+}
+
 H5Reader::Table H5Reader::table(const std::string& name) const
 {
     if (const auto seen = seen_.find(name); seen != seen_.end()) return seen->second;

@@ -1,19 +1,23 @@
 #include "io/picture.hpp"
-#include "io/canvas.hpp"
+#include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numbers>
+#include <mutex>
 
 namespace kuzure::io {
 namespace {
 
-constexpr int fine = 2;               // samples per pixel along each axis
-constexpr int shadow_reach = 8;       // samples over which nearer ground darkens
-constexpr double floor_margin = 0.12; // of the soil's extent, shown around it
+constexpr int fine = 2;                                                          // samples per pixel along each axis
+constexpr int shadow_reach = 4;                                                  // pixels over which nearer ground darkens
+constexpr float nothing = -1e30f;                                                // a depth further away than all
+constexpr std::array lights{0.2, 0.32, 0.44, 0.56, 0.67, 0.78, 0.89, 1.0, 1.07}; // on each colour in the palette
+constexpr double full_light = 200;                                               // of 255: what shows a colour as it is
+constexpr std::uint32_t striped = 1u << 31;                                      // what a wall hides but for stripes: kept for its depth
+constexpr std::uint32_t backing = 90;                                            // the light on what is behind walls' balls
+constexpr double ball = 0.56; // radius over spacing: a little larger than the lattice needs, so that no gaps show
 
-// ---- colours
-// ---------------------------------------------------------------------------------------------------------
+// ---- colours ---------------------------------------------------------------------------------------------------------------
 using Map = std::array<Rgb, 9>;
 /// Light to dark blue: the further, the darker. Equal steps are equally far apart in CIELAB (10.1 +-0.2).
 constexpr Map blues = {{{196, 222, 245},
@@ -35,412 +39,496 @@ constexpr Map viridis = {{{68, 1, 84},
                           {94, 201, 98},
                           {173, 220, 48},
                           {253, 231, 37}}};
-constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48}, broken_red = {222, 30, 38};
+/// Blue to red through white (ColorBrewer's RdBu), for quantities with signs.
+constexpr Map diverging = {{{33, 102, 172},
+                            {67, 147, 195},
+                            {146, 197, 222},
+                            {209, 229, 240},
+                            {247, 247, 247},
+                            {253, 219, 199},
+                            {244, 165, 130},
+                            {214, 96, 77},
+                            {178, 24, 43}}};
+constexpr Rgb wall_brown = {176, 141, 104}, ink = {38, 42, 48}, faint = {226, 228, 231}, broken_red = {222, 30, 38};
+constexpr int color_steps = 24;
 
-/// Values that can be compared with others: of a state whose numbers failed, not all can.
-bool usable(double v) { return std::isless(std::fabs(v), 1e100); } // quietly, of not-a-number too
-
+Rgb mixed(Rgb a, Rgb b, double f)
+{
+    const auto one = [&](std::uint8_t p, std::uint8_t q) { return std::uint8_t(std::lround(p + f * (q - p))); };
+    return {one(a.r, b.r), one(a.g, b.g), one(a.b, b.b)};
+}
 Rgb pick(const Map& map, double t)
 {
     const double s = std::clamp(t, 0.0, 1.0) * double(map.size() - 1);
     const auto k = std::min(std::size_t(s), map.size() - 2);
-    const double f = s - double(k);
-    const auto mixed = [&](std::uint8_t a, std::uint8_t b) { return std::uint8_t(std::lround(a + f * (b - a))); };
-    return {mixed(map[k].r, map[k + 1].r), mixed(map[k].g, map[k + 1].g), mixed(map[k].b, map[k + 1].b)};
+    return mixed(map[k], map[k + 1], s - double(k));
 }
-
-struct Quantity {
-    const char* name;
-    const char* unit;
-    const Map& map;
-};
-Quantity quantity(scene::Color c)
+Rgb lit(Rgb c, double light)
 {
-    switch (c) {
-    case scene::Color::Displacement:
-        return {"displacement", "m", blues};
-    case scene::Color::Speed:
-        return {"speed", "m/s", viridis};
-    case scene::Color::PlasticStrain:
-        return {"plastic strain", "", viridis};
-    case scene::Color::Pressure:
-        return {"pressure", "Pa", viridis};
-    }
-    throw Broken("a picture colour without a quantity");
+    const auto one = [&](std::uint8_t v) { return std::uint8_t(std::min(255.0, v * light)); };
+    return {one(c.r), one(c.g), one(c.b)};
 }
+const Map& map_of(Quantity::Map m) { return m == Quantity::Map::Blues ? blues : m == Quantity::Map::Viridis ? viridis : diverging; }
 
-double value(const Particles& p, scene::Color c, Index i)
+/// The colours of values, each under several lights; walls likewise; ink on white.
+std::vector<Rgb> palette_colors(const std::vector<Rgb>& values)
 {
-    switch (c) {
-    case scene::Color::Displacement:
-        return length(p[field::position][i] - p[field::origin][i]);
-    case scene::Color::Speed:
-        return length(p[field::velocity][i]);
-    case scene::Color::PlasticStrain:
-        return p.has(field::plastic_strain) ? p[field::plastic_strain][i] : 0;
-    case scene::Color::Pressure:
-        return trace(p[field::stress][i]) * (-1.0 / 3);
-    }
-    throw Broken("a picture colour without a quantity");
+    std::vector<Rgb> all;
+    for (int k = 0; k < 14; ++k) all.push_back(mixed(ink, {255, 255, 255}, k / 13.0));
+    all.push_back(faint);
+    for (const double light : {0.4, 0.6, 0.8, 1.0}) all.push_back(lit(broken_red, light));
+    for (int k = 0; k < 20; ++k) all.push_back(lit(wall_brown, 0.18 + 0.9 * k / 19));
+    for (const Rgb c : values)
+        for (const double light : lights) all.push_back(lit(c, light));
+    return all;
 }
 
-/// Least and largest value to tell apart, and whether larger ones exist.
-struct Range {
-    double low, high;
-    bool below = false, above = false;
-};
+float darkness(double blocked) { return float(std::exp(-1.1 * blocked)); }
 
-/// From the least to the largest value; where a few particles stand far out (less than 1 in 1000), up to the
-/// others. A displacement counts from one spacing on: less is not worth a colour.
-Range natural_range(const Team& team, const std::vector<double>& values, scene::Color color, double spacing)
-{
-    double low = HUGE_VAL, high = -HUGE_VAL;
-    for (const double v : values)
-        if (usable(v)) low = std::min(low, v), high = std::max(high, v);
-    low = team.min(low), high = team.max(high);
-    if (low > high) return {0, 1};
-    const bool from_zero = color != scene::Color::Pressure;
-    if (from_zero) low = std::min(low, 0.0);
-    Range r{low, high};
-    if (high - low > 0) {
-        std::vector<std::int64_t> count(2048);
-        const double bins = double(count.size()), bin = (high - low) / bins;
-        for (const double v : values)
-            if (usable(v)) ++count[std::min(std::size_t((v - low) / (high - low) * bins), count.size() - 1)];
-        team.sum(std::span<std::int64_t>(count));
-        std::int64_t all = 0, seen = 0;
-        for (const auto c : count) all += c;
-        const auto cut = [&](auto first, auto last) {
-            seen = 0;
-            auto at = first;
-            while (at != last && (seen += *at) * 1000 < all) ++at;
-            return at;
-        };
-        const double top = high - double(cut(count.rbegin(), count.rend()) - count.rbegin()) * bin;
-        const double bottom = low + double(cut(count.begin(), count.end()) - count.begin()) * bin;
-        if (top < low + 0.8 * (high - low)) r.high = top, r.above = true;
-        if (!from_zero && bottom > low + 0.2 * (high - low)) r.low = bottom, r.below = true;
-    } else {
-        r.high = r.low + 1;
-    }
-    if (color == scene::Color::Displacement && (r.high < spacing || high == low)) r = {0, spacing, false, high > spacing};
-    return r;
-}
+} // namespace
 
-/// 1, 2 or 5 times a power of ten, not below x.
-double round_up(double x)
-{
-    const double power = std::pow(10.0, std::floor(std::log10(x)));
-    for (const double m : {1.0, 2.0, 5.0, 10.0})
-        if (m * power >= x * (1 - 1e-9)) return m * power;
-    return 10 * power;
-}
+/// Balls as discs of samples: how far the surface stands out (spacings' multiples in m), and its light. Drawn at sixteen places
+/// within a sample where balls are small.
+struct Painter::Stamps {
+    int steps, size, middle;
+    double radius; // samples
+    std::vector<float> height;
+    std::vector<std::uint32_t> light;
 
-std::string number(double v, double step)
-{
-    if (std::fabs(v) < 1e-9 * step) v = 0;
-    const int digits = std::clamp(int(std::ceil(-std::log10(step) - 1e-9)), 0, 12);
-    if (step >= 1e5 || step < 1e-4) return fmt::format("{:.3g}", v);
-    return fmt::format("{:.{}f}", v, digits);
-}
-
-// ---- projection
-// ------------------------------------------------------------------------------------------------------
-/// Looks along -toward; x right and y down in samples of the full picture, depth towards the eye in m.
-struct Camera {
-    Vector right, up, toward;
-    double scale = 1, x0 = 0, y0 = 0;
-
-    explicit Camera(scene::View view)
+    Stamps(double r, double metres)
     {
-        double azimuth = -90, elevation = 0; // deg, where the eye stands
-        if (view == scene::View::Oblique) azimuth = -60, elevation = 24;
-        if (view == scene::View::Top) elevation = 90; // Side and Cut: from the front
-        const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
-        right = {-std::sin(a), std::cos(a), 0};
-        up = {-std::sin(e) * std::cos(a), -std::sin(e) * std::sin(a), std::cos(e)};
-        toward = {std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e)};
-    }
-    double x(Vector p) const { return x0 + scale * dot(right, p); }
-    double y(Vector p) const { return y0 - scale * dot(up, p); }
-    double depth(Vector p) const { return dot(toward, p); }
-
-    /// Fit a box into a part of the picture (samples).
-    void fit(const Extent& box, double left, double top, double width, double height)
-    {
-        double lo[2] = {HUGE_VAL, HUGE_VAL}, hi[2] = {-HUGE_VAL, -HUGE_VAL};
-        for (int k = 0; k < 8; ++k) {
-            const Vector corner{k & 1 ? box.high.x : box.low.x, k & 2 ? box.high.y : box.low.y, k & 4 ? box.high.z : box.low.z};
-            const double at[2] = {dot(right, corner), dot(up, corner)};
-            for (int c = 0; c < 2; ++c) lo[c] = std::min(lo[c], at[c]), hi[c] = std::max(hi[c], at[c]);
-        }
-        scale = std::min(width / (hi[0] - lo[0]), height / (hi[1] - lo[1]));
-        x0 = left + 0.5 * width - scale * 0.5 * (lo[0] + hi[0]);
-        y0 = top + 0.5 * height + scale * 0.5 * (lo[1] + hi[1]);
-    }
-};
-
-struct Splat {
-    float x, y, depth; // samples, samples, m
-    Rgb color;
-};
-
-// ---- samples
-// ---------------------------------------------------------------------------------------------------------
-// A sample is one number: depth above, colour below. The larger is the nearer, so that the largest over the
-// ranks is what the eye sees; equal depths are decided by colour, never by rank.
-using Sample = std::int64_t;
-constexpr Sample nothing = -1;
-
-struct Depths {
-    double low, per_metre;
-    Sample pack(double depth, Rgb c) const
-    {
-        const auto d = Sample(std::clamp((depth - low) * per_metre, 0.0, 2147483647.0));
-        return d << 24 | Sample(c.r) << 16 | Sample(c.g) << 8 | Sample(c.b);
-    }
-    double depth(Sample s) const { return low + double(s >> 24) / per_metre; }
-    static Rgb color(Sample s) { return {std::uint8_t(s >> 16), std::uint8_t(s >> 8), std::uint8_t(s)}; }
-};
-
-/// Rows [first, first + rows) of the samples.
-struct Strip {
-    int width, first, rows;
-    std::vector<Sample> sample;
-    Sample& at(int x, int y) { return sample[std::size_t(y - first) * std::size_t(width) + std::size_t(x)]; }
-    Sample at(int x, int y) const { return sample[std::size_t(y - first) * std::size_t(width) + std::size_t(x)]; }
-    bool holds(int x, int y) const { return x >= 0 && x < width && y >= first && y < first + rows; }
-};
-
-/// Brightness of a ball over its disc, and how far its surface stands out, at a distance (dx, dy) of at
-/// most 1.
-struct Ball {
-    double light, height;
-};
-Ball ball(double dx, double dy)
-{
-    const double nz = std::sqrt(std::max(0.0, 1 - dx * dx - dy * dy));
-    const double diffuse = std::max(0.0, -0.42 * dx - 0.60 * dy + 0.68 * nz); // light from the upper left, behind the eye
-    return {0.42 + 0.66 * diffuse, nz};
-}
-
-void draw(Strip& strip, const std::vector<Splat>& splats, double radius, double sphere, const Depths& depths)
-{
-    // Bands of rows belong to one thread each: no two write the same sample.
-    const int bands = 8, rows = (strip.rows + bands - 1) / bands;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int band = 0; band < bands; ++band) {
-        const int top = strip.first + band * rows, bottom = std::min(strip.first + strip.rows, top + rows);
-        for (const Splat& s : splats) {
-            if (s.y + radius < top || s.y - radius >= bottom || s.x + radius < 0 || s.x - radius >= strip.width) continue;
-            const int y0 = std::max(top, int(std::floor(s.y - radius))), y1 = std::min(bottom - 1, int(s.y + radius));
-            const int x0 = std::max(0, int(std::floor(s.x - radius))), x1 = std::min(strip.width - 1, int(s.x + radius));
-            for (int y = y0; y <= y1; ++y)
-                for (int x = x0; x <= x1; ++x) {
-                    const double dx = (x + 0.5 - s.x) / radius, dy = (y + 0.5 - s.y) / radius;
+        radius = std::max(r, 1.0); // never so small that samples are missed
+        steps = radius < 10 ? 4 : 1;
+        middle = int(std::ceil(radius));
+        size = 2 * middle + 2;
+        row = (size + lanes - 1) / lanes * lanes;
+        height.assign(std::size_t(steps * steps * size * row), -HUGE_VALF);
+        light.assign(height.size(), 0);
+        for (int place = 0; place < steps * steps; ++place)
+            for (int y = 0; y < size; ++y)
+                for (int x = 0; x < size; ++x) {
+                    const double dx = (x + 0.5 - middle - (place % steps + 0.5) / steps) / radius;
+                    const double dy = (y + 0.5 - middle - (place / steps + 0.5) / steps) / radius;
                     if (dx * dx + dy * dy > 1) continue;
-                    const Ball b = ball(dx, dy);
-                    const auto shade = [&](std::uint8_t c) { return std::uint8_t(std::min(255.0, c * b.light)); };
-                    const Rgb lit{shade(s.color.r), shade(s.color.g), shade(s.color.b)};
-                    auto& sample = strip.at(x, y);
-                    sample = std::max(sample, depths.pack(s.depth + sphere * b.height, lit));
+                    const double nz = std::sqrt(std::max(0.0, 1 - dx * dx - dy * dy));
+                    const double diffuse = std::max(0.0, -0.42 * dx - 0.60 * dy + 0.68 * nz); // light from the upper left, behind the eye
+                    const auto at = std::size_t((place * size + y) * row + x);
+                    height[at] = float(metres * nz);
+                    light[at] = std::uint32_t(std::lround(full_light * (0.42 + 0.66 * diffuse)));
                 }
+    }
+
+    /// A ball with its middle at (x, y) samples; `code` above the light in what is kept. Of two equally near ones the larger code wins:
+    /// the order in which they come makes no difference.
+    void put(float* depth, std::uint32_t* kept, int width, int rows, double x, double y, float z, std::uint32_t code) const
+    {
+        const double fx = std::floor(x), fy = std::floor(y);
+        const int place = std::min(int((y - fy) * steps), steps - 1) * steps + std::min(int((x - fx) * steps), steps - 1);
+        const int left = int(fx) - middle, top = int(fy) - middle;
+        const int first = std::max(0, -top), last = std::min(size, rows - top), a = std::max(0, -left), b = std::min(row, width - left);
+        const bool whole = a == 0 && b == row; // the usual case: whole registers
+        for (int r = first; r < last; ++r) {
+            const float* h = &height[std::size_t((place * size + r) * row)];
+            const std::uint32_t* l = &light[std::size_t((place * size + r) * row)];
+            const auto at = std::ptrdiff_t(top + r) * width + left;
+            if (whole)
+                for (int k = 0; k < row; k += lanes) cover<lanes>(depth + at + k, kept + at + k, h + k, l + k, z, code);
+            else
+                for (int k = a; k < b; ++k) cover<1>(depth + at + k, kept + at + k, h + k, l + k, z, code);
         }
     }
-}
 
-/// What stands nearer around a sample takes light from it (eye-dome lighting): outlines and hollows show.
-double openness(const Strip& strip, int x, int y, const Depths& depths, double spacing)
-{
-    const double here = depths.depth(strip.at(x, y));
-    double blocked = 0;
-    for (const int reach : {2, shadow_reach})
-        for (int k = 0; k < 8; ++k) {
-            const int dx[] = {1, 1, 0, -1, -1, -1, 0, 1}, dy[] = {0, 1, 1, 1, 0, -1, -1, -1};
-            const int a = x + reach * dx[k], b = y + reach * dy[k];
-            if (!strip.holds(a, b) || strip.at(a, b) == nothing) continue;
-            blocked += std::clamp((depths.depth(strip.at(a, b)) - here) / (3 * spacing) - 0.1, 0.0, 1.0) / 16;
+private:
+    static constexpr int lanes = 8;
+    int row; // of a stamp: whole registers
+    template <int n> static void cover(float* to, std::uint32_t* into, const float* h, const std::uint32_t* l, float z, std::uint32_t code)
+    {
+#pragma omp simd
+        for (int k = 0; k < n; ++k) {
+            const float here = z + h[k];
+            const std::uint32_t mine = code | l[k];
+            const bool nearer = (here > to[k]) | ((here == to[k]) & (mine > into[k]));
+            to[k] = nearer ? here : to[k];
+            into[k] = nearer ? mine : into[k];
         }
-    return std::exp(-1.1 * blocked);
-}
-
-// ---- around the picture
-// ----------------------------------------------------------------------------------------------
-void color_bar(Canvas& canvas, const Quantity& q, const Range& range)
-{
-    const int width = 26, height = canvas.height() / 2, left = canvas.width() - 190, top = (canvas.height() - height) / 2 + 10;
-    canvas.rectangle(left - 1, top - 1, width + 2, height + 2, ink);
-    for (int y = 0; y < height; ++y) canvas.rectangle(left, top + y, width, 1, pick(q.map, 1 - (y + 0.5) / height));
-    // Thousands and millions of a unit go into its name.
-    const double largest = std::max(std::fabs(range.low), std::fabs(range.high));
-    const bool scaled = std::string_view(q.unit) == "Pa";
-    const int power = !scaled || largest < 1e4 ? 0 : largest < 1e7 ? 3 : 6;
-    const std::string unit = *q.unit ? fmt::format(" [{}{}]", power == 3 ? "k" : power == 6 ? "M" : "", q.unit) : "";
-    const double factor = std::pow(10.0, -power);
-    canvas.text(left + 65, top - 28, 15, q.name + unit, ink, Anchor::Middle);
-    const double step = round_up((range.high - range.low) / 7);
-    for (double v = std::ceil(range.low / step - 1e-9) * step; v <= range.high + 1e-9 * step; v += step) {
-        const double y = top + height * (1 - (v - range.low) / (range.high - range.low));
-        canvas.line(left + width, y, left + width + 7, y, 1.5, ink);
-        canvas.text(left + width + 14, y + 6.5, 13, number(v * factor, step * factor), ink);
     }
-    if (range.above) canvas.text(left + width / 2.0, top - 7, 11, "^", ink, Anchor::Middle);
-    if (range.below) canvas.text(left + width / 2.0, top + height + 16, 11, "v", ink, Anchor::Middle);
+};
+
+namespace {
+
+const std::array<float, 257>& darkness_table()
+{
+    static const auto table = [] {
+        std::array<float, 257> t{};
+        for (int k = 0; k < 257; ++k) t[std::size_t(k)] = darkness(k / 256.0);
+        return t;
+    }();
+    return table;
 }
 
-void scale_bar(Canvas& canvas, double pixels_per_metre)
+/// What stands nearer around a pixel takes light from it (eye-dome lighting): outlines and hollows show. The light left to the n pixels
+/// of a row of depths that has shadow_reach pixels around it on all sides.
+void open_row(const float* depth, std::ptrdiff_t stride, int n, float per_metre, float* left)
 {
-    const double most = 0.2 * canvas.width() / pixels_per_metre;
-    double metres = round_up(most);
-    while (metres > most) metres = round_up(0.39 * metres); // 10 -> 5 -> 2 -> 1
-    const double length = metres * pixels_per_metre, x = 60, y = canvas.height() - 42;
-    canvas.line(x, y, x + length, y, 2.5, ink);
-    for (const double end : {x, x + length}) canvas.line(end, y - 7, end, y + 7, 2.5, ink);
-    canvas.text(x + 0.5 * length, y - 14, 15, metres < 0.01 ? fmt::format("{:g} mm", metres * 1000) : fmt::format("{:g} m", metres), ink,
-                Anchor::Middle);
+    std::fill(left, left + n, 0.0f);
+    for (const int reach : {1, shadow_reach})
+        for (const auto& [dx, dy] : {std::array{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}) {
+            const float* other = depth + reach * dx + reach * dy * stride;
+#pragma omp simd
+            for (int x = 0; x < n; ++x) {
+                const float by = (other[x] - depth[x]) * per_metre - 0.1f;
+                left[x] += by < 0 ? 0 : by > 1 ? 1 : by;
+            }
+        }
+    const auto& dark = darkness_table();
+    for (int x = 0; x < n; ++x) left[x] = dark[std::size_t(16 * left[x])]; // of sixteen neighbours
 }
 
-void ring(Canvas& canvas, double x, double y, double radius)
+/// The nearest of the samples of each pixel of a row.
+void nearest_of_row(const float* samples, std::ptrdiff_t stride, int n, float* to)
 {
-    const int sides = 48;
-    const auto corner = [&](int k) {
-        const double a = 2 * std::numbers::pi * k / sides;
-        return std::pair{x + radius * std::cos(a), y + radius * std::sin(a)};
-    };
-    for (int k = 0; k < sides; ++k) {
-        const auto [x0, y0] = corner(k);
-        const auto [x1, y1] = corner(k + 1);
-        canvas.line(x0, y0, x1, y1, 3, broken_red);
-    }
-}
-
-std::string cut_to_width(std::string title, double size, double width)
-{
-    if (Canvas::text_width(size, title) <= width) return title;
-    while (!title.empty() && Canvas::text_width(size, title + "...") > width) title.pop_back();
-    return title + "...";
+    static_assert(fine == 2);
+    for (int x = 0; x < n; ++x)
+        to[x] = std::max(std::max(samples[2 * x], samples[2 * x + 1]), std::max(samples[stride + 2 * x], samples[stride + 2 * x + 1]));
 }
 
 } // namespace
 
-Extent soil_extent(const Team& team, const Particles& p)
+Painter::Painter(const Stage& stage, const ColorRange& range, const Quantity& q, const std::string& title, double spacing,
+                 std::span<const Vector> walls, bool flat)
+    : stage_(stage), range_(range), spacing_(spacing), ground_(stage.width, stage.height)
 {
-    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-    const auto x = p[field::position];
-    for (int c = 0; c < 3; ++c)
-        for (Index i = 0; i < p.size(); ++i) {
-            if (!std::isfinite(x.column[c][i])) continue;
-            low[c] = std::min(low[c], x.column[c][i]);
-            high[c] = std::max(high[c], x.column[c][i]);
-        }
-    team.min(std::span<double>(low));
-    team.max(std::span<double>(high));
-    if (!(low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2])) return {};
-    return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+    ensure(spacing > 0, "a picture needs the particles' spacing");
+    ensure(range.high > range.low, "the range of a picture's colours is empty");
+    // Two directions from the middle of the bar mean nothing unless zero is there.
+    const bool both = range.low < 0 && range.high > 0;
+    const Map& map = map_of(q.map == Quantity::Map::Diverging && !both ? Quantity::Map::Viridis : q.map);
+    for (int k = 0; k < color_steps; ++k) colors_.push_back(pick(map, k / double(color_steps - 1)));
+    palette_ = std::make_unique<Palette>(palette_colors(colors_));
+    colors_.push_back(broken_red);
+    desks_ = std::make_shared<Desks>();
+    stamps_ = std::make_shared<Stamps>(ball * spacing * stage.camera.scale * fine, ball * spacing);
+    missing_ = Canvas::letters_missing(title + q.title);
+    draw_axes(flat);
+    draw_walls(walls);
+    draw_color_bar(q);
+    ground_.text(40, 38, 23, title, ink, Anchor::Left, stage.width - 300);
+    reduced_ = reduce(ground_, *palette_);
 }
 
-void write_picture(const Team& team, const Path& file, const Particles& p, const WallPoints& walls, const PictureLabel& label)
+void Painter::draw_walls(std::span<const Vector> walls)
 {
-    ensure(label.spacing > 0, "a picture needs the particles' spacing");
-    const bool flat = label.dimensions == 2;
-    Camera camera(flat ? scene::View::Side : label.look.view);
-    const bool cut = !flat && label.look.view == scene::View::Cut;
-    const bool side = flat || cut || label.look.view == scene::View::Side;
-    const Quantity q = quantity(label.look.color);
-    const double d = label.spacing;
-
-    // The soil, a margin of floor around it, and a little of the floor's thickness.
-    const double margin = std::max({floor_margin * (label.high.x - label.low.x), floor_margin * (label.high.y - label.low.y), 4 * d});
-    const Extent shown{{label.low.x - margin, flat ? -d : label.low.y - margin, label.low.z - 3.1 * d},
-                       {label.high.x + margin, flat ? d : label.high.y + margin, label.high.z + std::max(margin, 4 * d)}};
-    Extent framed = shown;
-    framed.high.z = label.high.z + d;
-    camera.fit(framed, fine * 60.0, fine * 90.0, fine * (label.width - 300.0), fine * (label.height - 190.0));
-
-    // What each particle of this rank looks like.
-    const auto n = p.size();
-    const auto x = p[field::position];
-    const auto in_slice = [&](double y) { return !cut || std::fabs(y - label.middle_y) <= d; };
-    std::vector<Index> shown_soil;
-    std::vector<double> values;
-    for (Index i = 0; i < n; ++i)
-        if (in_slice(x.column[1][i])) shown_soil.push_back(i), values.push_back(value(p, label.look.color, i));
-    Range range = natural_range(team, values, label.look.color, d);
-    if (const auto& fixed = label.look.range; fixed != std::array<double, 2>{})
-        range = {fixed[0], fixed[1], range.low<fixed[0], range.high> fixed[1]};
-    ensure(range.high > range.low, "the range of a picture's colours is empty");
-
-    std::vector<Splat> splats;
-    splats.reserve(shown_soil.size() + walls.size());
-    const double around = std::max({shown.high.x - shown.low.x, shown.high.y - shown.low.y, shown.high.z - shown.low.z});
-    const auto near = [&](double v, double low, double high) { return v > low - around && v < high + around; };
-    const auto add = [&](Vector at, Rgb color) {
-        if (flat) at.y = 0;
-        if (near(at.x, shown.low.x, shown.high.x) && near(at.y, shown.low.y, shown.high.y) && near(at.z, shown.low.z, shown.high.z))
-            splats.push_back({float(camera.x(at)), float(camera.y(at)), float(camera.depth(at)), color});
+    const Camera& c = stage_.camera;
+    const int width = fine * stage_.width, pad = shadow_reach, stride = stage_.width + 2 * pad;
+    const auto pixels = std::size_t(stage_.width) * std::size_t(stage_.height);
+    wall_far_.assign(pixels, nothing), wall_open_.assign(pixels, 1);
+    wall_near_.assign(pixels, nothing);
+    // Seen along the lattice, balls leave gaps: behind each stands a dark square.
+    const bool backed = c.view != scene::View::Oblique;
+    const int half = int(std::ceil(0.5 * spacing_ * c.scale * fine));
+    struct Place {
+        double x, y; // samples
+        float depth; // m
     };
-    for (std::size_t k = 0; k < values.size(); ++k)
-        add(x[shown_soil[k]], usable(values[k]) ? pick(q.map, (values[k] - range.low) / (range.high - range.low)) : broken_red);
-    for (const Vector& w : walls.position) {
-        bool seen = w.x > shown.low.x && w.x < shown.high.x && (flat || (w.y > shown.low.y && w.y < shown.high.y)) && w.z > shown.low.z &&
-                    w.z < shown.high.z && in_slice(w.y);
-        // A wall between the soil and the eye would hide what the picture is for.
-        const bool above_floor = w.z > label.low.z - 0.25 * d;
-        if (!flat && above_floor && w.y < label.low.y) seen = false;
-        if (!flat && !side && above_floor && w.x > label.high.x) seen = false;
-        // Nor may a high wall stand behind the title.
-        if (seen && camera.y(w) > fine * 75.0) add(w, wall_brown);
-    }
-    double near_far[2] = {HUGE_VAL, HUGE_VAL}; // least depth, least of -depth
-    for (const Splat& s : splats) {
-        near_far[0] = std::min(near_far[0], double(s.depth));
-        near_far[1] = std::min(near_far[1], -double(s.depth));
-    }
-    team.min(std::span<double>(near_far));
-    if (near_far[0] > -near_far[1]) near_far[0] = near_far[1] = 0;
-    const Depths depths{near_far[0], 2147483647.0 / (-near_far[1] - near_far[0] + d)};
+    std::vector<Place> places;
+    for (const Vector& w : walls)
+        if (stage_.frame.holds(w, 1e-6 * spacing_)) places.push_back({fine * c.x(w), fine * c.y(w), float(c.depth(w))});
+    if (places.empty()) return;
 
-    // A little larger than the lattice needs, so that no gaps show; never so small that samples are missed.
-    const double radius = std::max(0.56 * d * camera.scale, 1.0);
-    Canvas canvas(team.rank() == 0 ? label.width : 1, team.rank() == 0 ? label.height : 1);
-    const int strip_rows = (label.height + 9) / 10;
-    for (int top = 0; top < label.height; top += strip_rows) {
-        const int bottom = std::min(label.height, top + strip_rows);
-        // Reaches a little over its neighbours, for the shadows.
-        Strip strip{fine * label.width, std::max(0, fine * top - shadow_reach), 0, {}};
-        strip.rows = std::min(fine * label.height, fine * bottom + shadow_reach) - strip.first;
-        strip.sample.assign(std::size_t(strip.width) * std::size_t(strip.rows), nothing);
-        draw(strip, splats, radius, 0.56 * d, depths);
-        team.max(std::span<std::int64_t>(strip.sample));
-        if (team.rank() != 0) continue;
-#pragma omp parallel for schedule(static)
-        for (int y = top; y < bottom; ++y)
-            for (int px = 0; px < label.width; ++px) {
-                double sum[3] = {0, 0, 0};
-                for (int k = 0; k < fine * fine; ++k) {
-                    const int a = fine * px + k % fine, b = fine * y + k / fine;
-                    const Sample s = strip.at(a, b);
-                    const double light = s == nothing ? 1 : openness(strip, a, b, depths, d);
-                    const Rgb c = s == nothing ? Rgb{255, 255, 255} : Depths::color(s);
-                    sum[0] += light * c.r, sum[1] += light * c.g, sum[2] += light * c.b;
-                }
-                const auto mean = [](double v) { return std::uint8_t(std::lround(v / (fine * fine))); };
-                canvas.at(px, y) = {mean(sum[0]), mean(sum[1]), mean(sum[2])};
+    // Bands of rows, so that the samples of one stay in the cache.
+    const int rows = 48, bands = (stage_.height + rows - 1) / rows;
+    std::vector<float> depth(std::size_t(stride) * std::size_t(stage_.height + 2 * pad), nothing); // of the pixels, with a rim
+    std::vector<float> light(pixels, 0), covered(pixels, 0);
+#pragma omp parallel
+    {
+        std::vector<float> samples(std::size_t(width) * std::size_t(fine * rows));
+        std::vector<std::uint32_t> kept(samples.size());
+#pragma omp for schedule(dynamic, 1)
+        for (int band = 0; band < bands; ++band) {
+            const int top = fine * band * rows, high = fine * std::min(rows, stage_.height - band * rows);
+            std::fill(samples.begin(), samples.end(), nothing);
+            for (const Place& p : places) {
+                const double py = p.y - top;
+                if (py < -stamps_->size || py > high + stamps_->size) continue;
+                stamps_->put(samples.data(), kept.data(), width, high, p.x, py, p.depth, 0);
+                if (!backed) continue;
+                const int x = int(p.x), y = int(std::floor(py));
+                const auto behind = float(p.depth - 0.5 * spacing_);
+                for (int b = std::max(0, y - half); b < std::min(high, y + half); ++b)
+                    for (int a = std::max(0, x - half); a < std::min(width, x + half); ++a) {
+                        const auto at = std::size_t(b) * std::size_t(width) + std::size_t(a);
+                        if (behind > samples[at]) samples[at] = behind, kept[at] = backing;
+                    }
             }
-    }
-    on_root(team, [&] {
-        const std::string time = fmt::format("t = {:.3f} s", label.time);
-        canvas.text(label.width - 60, 52, 20, time, ink, Anchor::Right);
-        canvas.text(60, 52, 18, cut_to_width(label.title, 18, label.width - 200 - Canvas::text_width(20, time)), ink);
-        if (label.mark) {
-            const Vector at{label.mark->x, flat ? 0 : label.mark->y, label.mark->z};
-            if (near(at.x, shown.low.x, shown.high.x) && near(at.y, shown.low.y, shown.high.y) && near(at.z, shown.low.z, shown.high.z))
-                ring(canvas, camera.x(at) / fine, camera.y(at) / fine, std::max(1.7 * radius / fine, 14.0));
+            for (int y = 0; y < high / fine; ++y) {
+                const auto row = std::size_t(band * rows + y) * std::size_t(stage_.width);
+                const float* from = &samples[std::size_t(fine * y) * std::size_t(width)];
+                nearest_of_row(from, width, stage_.width, &wall_near_[row]);
+                std::copy_n(&wall_near_[row], stage_.width,
+                            &depth[std::size_t(band * rows + y + pad) * std::size_t(stride) + std::size_t(pad)]);
+                for (int x = 0; x < stage_.width; ++x) {
+                    if (wall_near_[row + std::size_t(x)] == nothing) continue;
+                    float least = HUGE_VALF, lit = 0;
+                    int n = 0;
+                    for (int k = 0; k < fine * fine; ++k) {
+                        const auto at = std::size_t(fine * y + k / fine) * std::size_t(width) + std::size_t(fine * x + k % fine);
+                        least = std::min(least, samples[at]);
+                        if (samples[at] != nothing) lit += float(kept[at]), ++n;
+                    }
+                    wall_far_[row + std::size_t(x)] = least;
+                    light[row + std::size_t(x)] = lit * float(1 / (full_light * fine * fine));
+                    covered[row + std::size_t(x)] = float(n) / (fine * fine);
+                }
+            }
         }
-        color_bar(canvas, q, range);
-        scale_bar(canvas, camera.scale / fine);
-        write_atomically(file, canvas.png());
-    });
+    }
+    const auto per_metre = float(1 / (3 * spacing_));
+#pragma omp parallel for schedule(static)
+    for (int y = 0; y < stage_.height; ++y) {
+        const auto row = std::size_t(y) * std::size_t(stage_.width);
+        open_row(&depth[std::size_t(y + pad) * std::size_t(stride) + std::size_t(pad)], stride, stage_.width, per_metre, &wall_open_[row]);
+        for (int x = 0; x < stage_.width; ++x) {
+            const auto at = row + std::size_t(x);
+            if (wall_near_[at] == nothing) {
+                wall_open_[at] = 1;
+                continue;
+            }
+            const Rgb under = ground_.at(x, y);
+            const float wall = light[at] * wall_open_[at], rest = 1 - covered[at];
+            const float color[3] = {wall * wall_brown.r + rest * under.r, wall * wall_brown.g + rest * under.g,
+                                    wall * wall_brown.b + rest * under.b};
+            std::uint32_t pixel = 0xff;
+            for (const float v : color) pixel = pixel << 8 | std::uint32_t(std::min(v, 255.0f));
+            ground_.row(y)[x] = pixel;
+        }
+    }
+}
+
+void Painter::draw_axes(bool flat)
+{
+    const Camera& c = stage_.camera;
+    const Extent& f = stage_.frame;
+    struct Axis {
+        const char* name;
+        Vector from, to; // m
+        double out[2];   // where the numbers stand, seen from the axis, pixels to the right and down
+        Anchor anchor;
+    };
+    std::vector<Axis> axes;
+    const bool oblique = c.view == scene::View::Oblique && !flat, top = c.view == scene::View::Top && !flat;
+    const Vector corner{f.low.x, f.low.y, f.low.z};
+    if (oblique) {
+        axes = {{"x", corner, {f.high.x, f.low.y, f.low.z}, {-0.55, 0.83}, Anchor::Middle},
+                {"y", {f.high.x, f.low.y, f.low.z}, {f.high.x, f.high.y, f.low.z}, {0.9, 0.43}, Anchor::Left},
+                {"z", corner, {f.low.x, f.low.y, f.high.z}, {-1, 0}, Anchor::Right}};
+    } else {
+        axes = {{"x", corner, {f.high.x, f.low.y, f.low.z}, {0, 1}, Anchor::Middle},
+                {top ? "y" : "z", corner, {f.low.x, top ? f.high.y : f.low.y, top ? f.low.z : f.high.z}, {-1, 0}, Anchor::Right}};
+    }
+    for (const Axis& a : axes) {
+        const double x0 = c.x(a.from), y0 = c.y(a.from), x1 = c.x(a.to), y1 = c.y(a.to), length = std::hypot(x1 - x0, y1 - y0);
+        const char which = *a.name;
+        const double low = which == 'x' ? a.from.x : which == 'y' ? a.from.y : a.from.z;
+        const double high = which == 'x' ? a.to.x : which == 'y' ? a.to.y : a.to.z;
+        if (!(high > low)) continue;
+        const Ticks marks = ticks(low, high, std::clamp(length / (which == 'x' ? 85.0 : 55.0), 1.0, 10.0));
+        double widest = 0;
+        for (const double v : marks.at) {
+            const double s = (v - low) / (high - low), x = x0 + s * (x1 - x0), y = y0 + s * (y1 - y0);
+            if (!oblique && which == 'x') ground_.line(x, stage_.top, x, stage_.bottom, 1, faint);
+            if (!oblique && which != 'x') ground_.line(stage_.left, y, stage_.right, y, 1, faint);
+            ground_.line(x, y, x + 7 * a.out[0], y + 7 * a.out[1], 1.4, ink);
+            const std::string text = marks.text(v);
+            widest = std::max(widest, Canvas::text_width(16, text));
+            ground_.text(x + (a.anchor == Anchor::Middle ? 20 : 12) * a.out[0], y + 20 * a.out[1], 16, text, ink, a.anchor);
+        }
+        ground_.line(x0, y0, x1, y1, 1.4, ink);
+        const double x = 0.5 * (x0 + x1), y = 0.5 * (y0 + y1);
+        const std::string name = fmt::format("{} [m]", a.name);
+        if (a.anchor == Anchor::Right) ground_.text(x - 30 - widest, y, 18, name, ink, Anchor::Middle, 0, true);
+        else if (a.anchor == Anchor::Left) ground_.text(x + 30 + widest, y + 34, 18, name, ink, Anchor::Left);
+        else ground_.text(x + (oblique ? 50 * a.out[0] : 0), y + (oblique ? 52 * a.out[1] : 50), 18, name, ink, Anchor::Middle);
+    }
+    if (!oblique) { // the frame's other sides
+        ground_.line(stage_.left, stage_.top, stage_.right, stage_.top, 1, faint);
+        ground_.line(stage_.right, stage_.top, stage_.right, stage_.bottom, 1, faint);
+    }
+}
+
+void Painter::draw_color_bar(const Quantity& q)
+{
+    const int width = 26, height = ground_.height() / 2, left = ground_.width() - 150, top = (ground_.height() - height) / 2 + 18;
+    // Thousands and millions of a unit, and thousandths, go into its name.
+    const double largest = std::max(std::fabs(range_.low), std::fabs(range_.high));
+    int power = 0;
+    if (q.unit == "Pa") power = largest < 1e4 ? 0 : largest < 1e7 ? 3 : 6;
+    if (q.unit == "m" || q.unit == "m/s") power = largest < 0.05 ? -3 : 0;
+    const char* prefix = power == 3 ? "k" : power == 6 ? "M" : power == -3 ? "m" : "";
+    const std::string unit = q.unit.empty() || q.unit == "1" ? "" : fmt::format(" [{}{}]", prefix, q.unit);
+    const double factor = std::pow(10.0, -power);
+    ground_.text(left + 0.5 * width + 10, top - 30, 17, q.title + unit, ink, Anchor::Middle, 210);
+    ground_.rectangle(left - 1, top - 1, width + 2, height + 2, ink);
+    for (int y = 0; y < height; ++y) {
+        const double t = 1 - (y + 0.5) / height;
+        ground_.rectangle(left, top + y, width, 1, colors_[std::min(std::size_t(t * color_steps), std::size_t(color_steps - 1))]);
+    }
+    const Ticks marks = ticks(range_.low, range_.high, 7);
+    for (const double v : marks.at) {
+        const double y = top + height * (1 - (v - range_.low) / (range_.high - range_.low));
+        ground_.line(left + width, y, left + width + 6, y, 1.4, ink);
+        ground_.text(left + width + 12, y, 16, marks.text(v, factor), ink);
+    }
+    // Values beyond an end have its colour: an arrow says that there are some.
+    const double middle = left + 0.5 * width, half = 0.5 * width;
+    if (range_.above)
+        ground_.triangle({{{middle - half, top - 2.0}, {middle + half, top - 2.0}, {middle, top - 16.0}}}, colors_[color_steps - 1]);
+    const double end = top + height + 2.0;
+    if (range_.below) ground_.triangle({{{middle - half, end}, {middle + half, end}, {middle, end + 14}}}, colors_[0]);
+}
+
+/// What one thread draws on. Kept from picture to picture: fresh memory costs more than drawing on it.
+struct Painter::Scratch {
+    struct Samples {
+        std::vector<float> depth, near;
+        std::vector<std::uint32_t> kept;
+    } samples;
+    Canvas canvas{1, 1};
+    Reduced picture;
+};
+struct Painter::Desks {
+    std::mutex mutex;
+    std::vector<std::unique_ptr<Scratch>> free;
+};
+
+std::shared_ptr<Painter::Scratch> Painter::borrow() const
+{
+    const auto desks = desks_;
+    std::unique_ptr<Scratch> one;
+    {
+        const std::lock_guard lock(desks->mutex);
+        if (!desks->free.empty()) one = std::move(desks->free.back()), desks->free.pop_back();
+    }
+    if (!one) one = std::make_unique<Scratch>();
+    return {one.release(), [desks](Scratch* s) {
+                const std::lock_guard lock(desks->mutex);
+                desks->free.emplace_back(s);
+            }};
+}
+
+std::string Painter::draw(const Moment& moment) const
+{
+    ensure(moment.places.size() == moment.values.size(), "a picture needs one value a place");
+    const Camera& c = stage_.camera;
+    const double reach = stamps_->radius + 2;
+
+    // Where soil is in the picture: only there something has to be drawn.
+    double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+    std::size_t outside = 0;
+    for (const Vector& p : moment.places) {
+        if (!stage_.frame.holds(p, spacing_)) {
+            ++outside;
+            continue;
+        }
+        const double x = c.x(p), y = c.y(p);
+        low[0] = std::min(low[0], x), high[0] = std::max(high[0], x);
+        low[1] = std::min(low[1], y), high[1] = std::max(high[1], y);
+    }
+    const auto scratch = borrow();
+    Canvas& canvas = scratch->canvas;
+    Reduced& picture = scratch->picture;
+    canvas = ground_, picture = reduced_;
+    if (low[0] <= high[0]) {
+        const double spare = reach / fine + 1;
+        const int x0 = std::clamp(int(low[0] - spare), 0, stage_.width), x1 = std::clamp(int(high[0] + spare) + 1, 0, stage_.width);
+        const int y0 = std::clamp(int(low[1] - spare), 0, stage_.height), y1 = std::clamp(int(high[1] + spare) + 1, 0, stage_.height);
+        const int width = x1 - x0, height = y1 - y0, samples = fine * width;
+        auto& [depth, near, kept] = scratch->samples;
+        depth.assign(std::size_t(samples) * std::size_t(fine * height), nothing);
+        kept.resize(depth.size());
+        const double per_step = color_steps / (range_.high - range_.low);
+        for (std::size_t k = 0; k < moment.places.size(); ++k) {
+            const Vector& p = moment.places[k];
+            if (!stage_.frame.holds(p, spacing_)) continue;
+            const double t = (moment.values[k] - range_.low) * per_step;
+            const bool usable = std::isless(std::fabs(t), 1e100); // quietly, of not-a-number too
+            const auto color = usable ? std::uint32_t(std::clamp(t, 0.0, color_steps - 1.0)) : std::uint32_t(color_steps);
+            stamps_->put(depth.data(), kept.data(), samples, fine * height, fine * (c.x(p) - x0), fine * (c.y(p) - y0), float(c.depth(p)),
+                         color << 8);
+        }
+
+        // What a wall hides: close to it, for good; a wall that stands well in front shows as stripes over what it hides.
+        const auto close = float(2 * spacing_);
+        for (int y = 0; y < fine * height; ++y) {
+            float* d = &depth[std::size_t(y) * std::size_t(samples)];
+            const int py = y0 + y / fine;
+            std::uint32_t* codes = &kept[std::size_t(y) * std::size_t(samples)];
+            const float* walls = &wall_far_[std::size_t(py) * std::size_t(stage_.width) + std::size_t(x0)];
+            for (int x = 0; x < samples; ++x) {
+                const float wall = walls[x / fine];
+                if (d[x] == nothing || wall <= d[x]) continue;
+                if (wall <= d[x] + close) d[x] = nothing;
+                else if ((x0 + x / fine + py) % 6 < 2) codes[x] |= striped;
+            }
+        }
+
+        // Depth of the pixels, walls included, with a rim.
+        const int pad = shadow_reach, stride = width + 2 * pad;
+        near.assign(std::size_t(stride) * std::size_t(height + 2 * pad), nothing);
+        for (int y = std::max(-pad, -y0); y < std::min(height + pad, stage_.height - y0); ++y) {
+            const int a = std::max(-pad, -x0), b = std::min(width + pad, stage_.width - x0);
+            const float* wall = &wall_near_[std::size_t(y0 + y) * std::size_t(stage_.width) + std::size_t(x0)];
+            std::copy(wall + a, wall + b, &near[std::size_t(y + pad) * std::size_t(stride) + std::size_t(pad + a)]);
+        }
+        std::vector<float> soil(static_cast<std::size_t>(width)), open(soil.size());
+        for (int y = 0; y < height; ++y) {
+            float* to = &near[std::size_t(y + pad) * std::size_t(stride) + std::size_t(pad)];
+            nearest_of_row(&depth[std::size_t(fine * y) * std::size_t(samples)], samples, width, soil.data());
+            for (int x = 0; x < width; ++x) to[x] = soil[std::size_t(x)] != nothing ? soil[std::size_t(x)] : to[x];
+        }
+
+        const auto per_metre = float(1 / (3 * spacing_));
+        for (int y = 0; y < height; ++y) {
+            const float* d = &near[std::size_t(y + pad) * std::size_t(stride) + std::size_t(pad)];
+            open_row(d, stride, width, per_metre, open.data());
+            nearest_of_row(&depth[std::size_t(fine * y) * std::size_t(samples)], samples, width, soil.data());
+            std::uint32_t* row = canvas.row(y0 + y) + x0;
+            const float* before = &wall_open_[std::size_t(y0 + y) * std::size_t(stage_.width) + std::size_t(x0)];
+            for (int x = 0; x < width; ++x) {
+                const bool any = soil[std::size_t(x)] != nothing;
+                const float light = open[std::size_t(x)], ground = std::min(light / before[x], 1.0f);
+                if (!any && (d[x] == nothing || ground > 0.995f)) continue;
+                const std::uint32_t under = row[x];
+                float sum[3] = {0, 0, 0};
+                for (int k = 0; k < fine * fine; ++k) {
+                    const auto at = std::size_t(fine * y + k / fine) * std::size_t(samples) + std::size_t(fine * x + k % fine);
+                    const bool here = depth[at] != nothing && kept[at] < striped;
+                    const float by = here ? light * float((kept[at] & 255) / full_light) : ground;
+                    const Rgb color =
+                        here ? colors_[kept[at] >> 8] : Rgb{std::uint8_t(under >> 16), std::uint8_t(under >> 8), std::uint8_t(under)};
+                    sum[0] += by * color.r, sum[1] += by * color.g, sum[2] += by * color.b;
+                }
+                std::uint32_t pixel = 0xff;
+                for (const float v : sum) pixel = pixel << 8 | std::uint32_t(std::min(v / (fine * fine), 255.0f));
+                row[x] = pixel;
+            }
+        }
+        picture.take(canvas, *palette_, {x0, y0, width, height});
+    }
+
+    const int right = stage_.width - 40;
+    canvas.text(right, 38, 24, moment.time, ink, Anchor::Right);
+    picture.take(canvas, *palette_, {right - 240, 14, 280, 48});
+    if (outside > 0) {
+        canvas.text(40, stage_.height - 16, 15, fmt::format("{} of {} particles are outside", outside, moment.places.size()), broken_red);
+        picture.take(canvas, *palette_, {30, stage_.height - 30, 500, 30});
+    }
+    if (moment.mark && stage_.frame.holds(*moment.mark, spacing_)) {
+        const double x = c.x(*moment.mark), y = c.y(*moment.mark), radius = std::max(1.7 * stamps_->radius / fine, 14.0);
+        canvas.ring(x, y, radius, 3, broken_red);
+        const int around = int(radius) + 4;
+        picture.take(canvas, *palette_, {int(x) - around, int(y) - around, 2 * around, 2 * around});
+    }
+    return png(picture, *palette_);
 }
 
 } // namespace kuzure::io

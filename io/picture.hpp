@@ -1,37 +1,59 @@
 #pragma once
-// A picture of the soil without any other program: shaded spheres in parallel projection, walls brown, a
-// colour bar, a scale and the time. Every rank draws its own particles; the nearest one wins at each sample,
-// so that the picture is the same for any number of ranks.
-#include "io/file.hpp"
-#include "io/wall_points.hpp"
-#include "solver/core/particles.hpp"
-#include "solver/scene/scene.hpp"
-#include <optional>
+// A picture of the soil without any other program: shaded spheres in parallel projection, walls brown, axes, a colour bar and the time.
+// A painter draws all pictures of a run: what does not change is drawn once.
+#include "io/canvas.hpp"
+#include "io/picture_frame.hpp"
+#include <cstdint>
 
 namespace kuzure::io {
 
-struct PictureLabel {
-    scene::Picture look;
-    int dimensions = 3; // 2: always seen from the side
-    Vector low, high;   // m, box to frame: where the soil stands, over all ranks
-    double spacing = 0; // m, diameter of a particle
-    std::string title;
-    double time = 0;                 // s
-    double middle_y = 0;             // m, where View::Cut cuts
-    int width = 1600, height = 900;  // pixels
-    std::optional<Vector> mark = {}; // m, what a red ring is drawn around, if the picture shows it; the same on all ranks
+/// What the colours mean.
+struct Quantity {
+    std::string title; // "plastic strain"
+    std::string unit;  // as in files: "1" has none
+    enum class Map { Blues, Viridis, Diverging } map = Map::Viridis;
 };
 
-/// The box around the soil of all ranks. Collective. A point at the origin where there is none.
-struct Extent {
-    Vector low, high; // m
+/// One state of the soil.
+struct Moment {
+    std::span<const Vector> places;  // m
+    std::span<const double> values;  // one a place
+    std::string time;                // as it is written
+    std::optional<Vector> mark = {}; // m, what a red ring is drawn around, if it is in the frame
 };
-Extent soil_extent(const Team&, const Particles&);
 
-/// Collective; rank 0 writes a PNG file. Needs the columns of what colours it: origin, velocity or stress; a
-/// plastic strain nobody carries is zero, a value that is no number red. What lies far outside the frame is left out.
-/// Memory: 8 bytes x 4
-/// samples x a tenth of the picture, on every rank. Throws IoFailed.
-void write_picture(const Team&, const Path& file, const Particles&, const WallPoints&, const PictureLabel&);
+class Painter {
+public:
+    /// Walls: one point each, m, those to be shown. Throws BadInput where can_draw() is false.
+    Painter(const Stage&, const ColorRange&, const Quantity&, const std::string& title, double spacing, std::span<const Vector> walls,
+            bool flat);
+    /// The bytes of a PNG file. A value that is no number shows red; what lies outside the frame is left out and counted in words. The
+    /// order of the places makes no difference. Any number of threads may draw at the same time. Throws IoFailed.
+    std::string draw(const Moment&) const;
+    /// Letters of the title for which no font is here; empty if all is well.
+    const std::string& missing() const { return missing_; }
+
+private:
+    struct Stamps; // discs of a ball, at fractions of a sample
+    struct Scratch;
+    struct Desks;
+    std::shared_ptr<Scratch> borrow() const;
+    void draw_walls(std::span<const Vector> walls);
+    void draw_axes(bool flat);
+    void draw_color_bar(const Quantity&);
+
+    Stage stage_;
+    ColorRange range_;
+    double spacing_;
+    std::string missing_;
+    std::vector<Rgb> colors_; // of the values, from the lowest
+    std::shared_ptr<const Stamps> stamps_;
+    std::shared_ptr<Desks> desks_;            // for the threads that draw
+    std::vector<float> wall_near_, wall_far_; // of the pixels' samples, m towards the eye; very low where one has no wall
+    std::vector<float> wall_open_;            // of the pixels: the light that other walls leave them
+    Canvas ground_;                           // all that does not change
+    std::unique_ptr<const Palette> palette_;
+    Reduced reduced_; // ground_
+};
 
 } // namespace kuzure::io

@@ -229,7 +229,7 @@ template <class A> void describe_output(A& a, scene::Output& output)
     a.choices("output.fields", output.fields, {"velocity", "stress", "density", "plastic_strain", "displacement"},
               {.fallback = R"(["velocity", "stress", "density", "plastic_strain", "displacement"])",
                .example = "[\"velocity\", \"stress\"]",
-               .doc = "fields of snapshots beside position, id, kind and soil"});
+               .doc = "fields of snapshots beside position, id, kind and soil; what colours the pictures is kept too"});
     a.number("output.history", output.history,
              {.unit = "s",
               .range = above(0),
@@ -243,7 +243,8 @@ template <class A> void describe_output(A& a, scene::Output& output)
     a.number("output.checkpoint_minutes", output.checkpoint_minutes,
              {.unit = "min", .range = above(0), .fallback = "30.0", .example = "30.0", .doc = "wall time between checkpoints"});
     a.table("output.picture", output.picture,
-            {.example = R"({ view = "oblique", color = "displacement" })", .doc = "pictures of the snapshots"},
+            {.example = R"({ view = "oblique", color = "displacement" })",
+             .doc = "pictures of the snapshots, drawn when the run ends or stops: one camera, one range of colours"},
             [&](const std::string& p, auto& v) {
                 a.choice(
                     p + ".view", v.view,
@@ -261,8 +262,8 @@ template <class A> void describe_output(A& a, scene::Output& output)
                        {.unit = "of the colour",
                         .optional = true,
                         .example = "[0.0, 1.0]",
-                        .doc = "least and largest value of the colours (m, m/s, 1, Pa), the same in every picture; without it what the "
-                               "soil shows, anew each time"});
+                        .doc = "least and largest value of the colours (m, m/s, 1, Pa); without it those of the whole run, of 98 % of "
+                               "the soil where single grains stand far out"});
             });
     a.flag("output.movie", output.movie,
            {.fallback = "false", .example = "true", .doc = "the pictures as a film at the end (needs ffmpeg)"});

@@ -22,12 +22,6 @@ bool wanted(const std::vector<std::string>& fields, std::string_view name)
     return fields.empty() || std::find(fields.begin(), fields.end(), name) != fields.end();
 }
 
-/// state_000000.hdf and its like.
-bool is_snapshot(std::string_view name)
-{
-    return name.size() == 16 && name.starts_with("state_") && name.ends_with(".hdf") && name.find_first_not_of("0123456789", 6) == 12;
-}
-
 /// Rows of this rank as they go to the file: its soil, then its walls.
 class Rows {
 public:
@@ -64,6 +58,14 @@ private:
 };
 
 } // namespace
+
+std::optional<int> snapshot_number(const Path& file)
+{
+    const std::string name = file.filename().string();
+    if (name.size() != 16 || !name.starts_with("state_") || !name.ends_with(".hdf") || name.find_first_not_of("0123456789", 6) != 12)
+        return {};
+    return std::stoi(name.substr(6, 6));
+}
 
 std::vector<std::string> snapshot_fields()
 {
@@ -105,6 +107,7 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
     out.attribute(top, "step", label.step);
     out.attribute(top, "time_unit", "s");
     out.attribute(top, "title", label.title);
+    if (label.failed) out.attribute(top, "failed_particle", *label.failed);
 
     const auto table = [&](const std::string& name, auto rows, int components, const char* unit) {
         out.table(name, rows, components);
@@ -201,7 +204,7 @@ Path last_snapshot(const Path& results)
     Path last;
     std::error_code error;
     for (const auto& e : std::filesystem::directory_iterator(results / "snapshots", error))
-        if (is_snapshot(e.path().filename().string()) && last.filename() < e.path().filename()) last = e.path();
+        if (snapshot_number(e.path()) && last.filename() < e.path().filename()) last = e.path();
     if (last.empty()) throw IoFailed(fmt::format("{}: no snapshot is there: run the scene again", (results / "snapshots").string()));
     return last;
 }
@@ -217,7 +220,7 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
         std::vector<std::string> names;
         for (const auto& e : fs::directory_iterator(directory)) {
             const std::string name = e.path().filename().string();
-            if (is_snapshot(name)) names.push_back(name);
+            if (snapshot_number(e.path())) names.push_back(name);
         }
         std::sort(names.begin(), names.end());
         // The files are the truth: they know their times also where the series was lost.
@@ -243,7 +246,17 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
 Path Snapshots::write(const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     const Entry entry{fmt::format("state_{:06}.hdf", next_), label.time};
-    write_snapshot(team_, directory_ / entry.name, p, walls, label);
+    if (!walls_there_) {
+        const Path alone = directory_ / "walls.hdf";
+        std::error_code ignored;
+        const bool there = team_.any(team_.rank() == 0 && std::filesystem::exists(alone, ignored));
+        Particles no_soil;
+        no_soil.require(field::density);
+        if (!there && team_.sum(std::int64_t(walls.size())) > 0)
+            write_snapshot(team_, alone, no_soil, walls, {label.time, label.step, label.dimensions, label.title, {"density"}, {}});
+        walls_there_ = true;
+    }
+    write_snapshot(team_, directory_ / entry.name, p, next_ == 0 ? walls : WallPoints{}, label);
     entries_.push_back(entry);
     ++next_;
     write_series();

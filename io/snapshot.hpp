@@ -17,7 +17,8 @@ struct SnapshotLabel {
     std::int64_t step = 0;
     int dimensions = 3;
     std::string title;
-    std::vector<std::string> fields; // of snapshot_fields(); empty: all
+    std::vector<std::string> fields;         // of snapshot_fields(); empty: all
+    std::optional<std::int64_t> failed = {}; // id of the particle at which the numbers failed
 };
 
 /// Size of a snapshot file of that many points (soil and wall).
@@ -39,7 +40,11 @@ SoilSnapshot read_snapshot(const Path& file);
 /// The newest snapshot of a result directory. Throws IoFailed where there is none.
 Path last_snapshot(const Path& results);
 
-/// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series.
+/// True of state_000000.hdf and its like; the number in it.
+std::optional<int> snapshot_number(const Path& file);
+
+/// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series. The walls, which do not move, are in the first
+/// of them and, alone, in walls.hdf.
 class Snapshots {
 public:
     /// Collective; the directory exists. With a restart time the snapshots up to it stay and later ones are
@@ -63,6 +68,7 @@ private:
     Path directory_;
     std::vector<Entry> entries_;
     int next_ = 0;
+    bool walls_there_ = false;
 };
 
 } // namespace kuzure::io

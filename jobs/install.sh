@@ -2,18 +2,19 @@
 # Install what kuzure needs (Debian 12 or later, Ubuntu 24.04 or later): as root, or with a sudo that asks no password.
 #   jobs/install.sh          to build and run
 #   jobs/install.sh tests    also what only the test suite needs
-#   jobs/install.sh extras   also a browser for the report's test and ffmpeg for films; Ubuntu has Chromium as a snap only
+#   jobs/install.sh extras   also a browser for the report's test, ffmpeg for films and a font for Japanese titles; Ubuntu has Chromium as a
+#                            snap only
 #   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
 
 build=(g++ cmake ninja-build ccache git make pkg-config)
 libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlplusplus-dev libcli11-dev libfmt-dev
-    libpng-dev nlohmann-json3-dev libgtest-dev libgmock-dev libbenchmark-dev)
+    libpng-dev libpango1.0-dev fonts-dejavu-core nlohmann-json3-dev libgtest-dev libgmock-dev libbenchmark-dev)
 scripts=(python3 python3-h5py python3-numpy)
 command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
 tests=(clang-format valgrind binutils dpkg-dev fakeroot python3-jsonschema)
-extras=(ffmpeg)
+extras=(ffmpeg fonts-ipafont-gothic)
 command -v chromium >/dev/null || extras+=(chromium)
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
@@ -44,10 +45,10 @@ if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
     fail "this is not a Debian or Ubuntu system, so the packages have to be installed by hand." \
         "missing here: ${missing[*]}" \
         "needed: a C++20 compiler (g++ 11 to 14), cmake 3.22+, ninja, git, make; an MPI; METIS 5; parallel HDF5 1.10+;" \
-        "  toml++ 3.3+, CLI11 2, fmt 8+, libpng, nlohmann-json 3; GoogleTest 1.12+, Google Benchmark; python3 with h5py and" \
+        "  toml++ 3.3+, CLI11 2, fmt 8+, libpng, Pango with Cairo (for pictures), nlohmann-json 3; GoogleTest 1.12+, Google Benchmark; python3 with h5py and" \
         "  numpy; gnuplot; for the tests clang-format 14, valgrind, binutils and python3-jsonschema." \
         "Fedora: dnf install gcc-c++ cmake ninja-build ccache git make openmpi-devel metis-devel hdf5-openmpi-devel tomlplusplus-devel" \
-        "  cli11-devel fmt-devel libpng-devel json-devel gtest-devel gmock-devel google-benchmark-devel python3-h5py python3-jsonschema gnuplot" \
+        "  cli11-devel fmt-devel libpng-devel pango-devel dejavu-sans-fonts json-devel gtest-devel gmock-devel google-benchmark-devel python3-h5py python3-jsonschema gnuplot" \
         "Debian names: ${packages[*]}"
 fi
 

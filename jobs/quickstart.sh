@@ -29,7 +29,7 @@ fi
 if ! $kuzure report $results >/dev/null; then echo "(no report: the message above says why; the results are complete)" >&2; fi
 
 shopt -s nullglob
-pictures=("$results"/picture_*.png) # in order of time
+pictures=("$results"/picture_[0-9]*.png) # in order of time
 named() { realpath -s --relative-to="$from" "$1"; }
 cat <<EOF
 

@@ -11,6 +11,9 @@
 namespace CLI {
 class App;
 }
+namespace kuzure::io {
+struct PictureTask;
+}
 
 namespace kuzure {
 
@@ -35,6 +38,9 @@ std::string other_writer(const io::Checkpoint&);
 /// Collective. Throws BadInput, with the keys that differ, where a checkpoint belongs to another scene.
 void require_same_scene(const Comm&, const io::Checkpoint&, const Scene&);
 
+/// The pictures that the scene asks for, or those by default where it asks for none, from the results in a directory.
+io::PictureTask picture_task(const Scene&, const io::Path& results);
+
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
 void add_run(CLI::App&, Action& chosen);
@@ -42,6 +48,7 @@ void add_check(CLI::App&, Action& chosen);
 void add_reference(CLI::App&, Action& chosen);
 void add_scale(CLI::App&, Action& chosen);
 void add_report(CLI::App&, Action& chosen);
+void add_picture(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);

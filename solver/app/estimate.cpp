@@ -72,7 +72,8 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     // Outputs come at steps: never more of them than steps.
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };
     e.snapshots = s.output.every ? times(*s.output.every) + 2 : 2;
-    e.snapshot = double(io::snapshot_bytes(e.soil + e.walls, s.output.fields));
+    e.snapshot = double(io::snapshot_bytes(e.soil, s.output.fields));
+    e.wall_files = e.walls > 0 ? 2 * double(io::snapshot_bytes(e.walls, s.output.fields)) : 0;
     e.checkpoint = double(io::checkpoint_bytes(e.soil, std::size_t(columns / std::max<double>(1, double(e.soil)))));
     e.history_rows = s.output.history ? times(*s.output.history) + 1 : 1;
     e.history = e.history_rows * 320;

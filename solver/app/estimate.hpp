@@ -13,7 +13,8 @@ struct Estimate {
     std::int64_t soil, walls, steps;
     double dt;         // s
     double memory;     // bytes of all ranks together, but for what every process takes to begin with
-    double snapshot;   // bytes of one
+    double snapshot;   // bytes of one: soil
+    double wall_files; // bytes of the walls in the first snapshot and in walls.hdf
     double checkpoint; // bytes of one
     double snapshots;  // how many
     double history;    // bytes
@@ -24,7 +25,7 @@ struct Estimate {
     bool mixed;     // precision of the pair sums
 
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
-    double disk() const { return snapshots * snapshot + 3 * checkpoint + history; }
+    double disk() const { return snapshots * snapshot + wall_files + 3 * checkpoint + history; }
 };
 /// Neighbours inside the support of one soil particle, walls included: mean over the scene as filled.
 double neighbours_at_start(const Scene&, const scene::Filling&);

@@ -14,8 +14,10 @@ namespace {
 // slower or faster as `chain_seconds` is.
 constexpr double reference_chain = 4.07e-3; // s
 constexpr double history_particle = 30e-9;  // s a soil particle of a rank and row
-constexpr double picture_base = 0.35;       // s
-constexpr double picture_particle = 1.0e-6; // s a particle of soil and walls
+constexpr double pictures_base = 0.06;      // s: fonts, axes, colours, once
+constexpr double wall_particle = 0.3e-6;    // s a wall particle, once
+constexpr double picture_base = 0.012;      // s of one core, each
+constexpr double picture_particle = 0.4e-6; // s of one core a soil particle
 constexpr double snapshot_base = 4.2e-3;    // s: two files made, synced, renamed
 constexpr double file_byte = 2.5e-9;        // s
 
@@ -116,9 +118,13 @@ Forecast forecast(const Comm& comm, const Scene& s, const scene::Filling& f, con
     const double soil = double(e.soil), in_steps = e.pairs * (1 - done) * pair;
     const double lists = rebuilds(s, f, double(e.steps)) * (1 - done) * soil * m.rebuild_particle;
     const double rows = e.history_rows * soil / comm.size() * history_particle;
-    const double pictures = s.output.picture ? e.snapshots * (picture_base + picture_particle * double(e.soil + e.walls)) : 0;
-    const double files = e.snapshots * snapshot_base + (e.snapshots * e.snapshot + (1 - done) * e.checkpoint) * file_byte;
-    const double rest = lists + slower * ((1 - done) * (rows + pictures) + files) + 2 * (omp_get_wtime() - begin);
+    // All of them at the end, also those of before a restart; the ranks and their threads share them.
+    const double hands = std::min(e.snapshots, double(comm.size()) * omp_get_max_threads());
+    const double pictures = s.output.picture ? pictures_base + wall_particle * double(e.walls) +
+                                                   e.snapshots / hands * (picture_base + picture_particle * double(e.soil))
+                                             : 0;
+    const double files = e.snapshots * snapshot_base + (e.snapshots * e.snapshot + e.wall_files + (1 - done) * e.checkpoint) * file_byte;
+    const double rest = lists + slower * ((1 - done) * rows + pictures + files) + 2 * (omp_get_wtime() - begin);
     Forecast out;
     out.pair_nanoseconds = 1e9 * pair;
     out.seconds = in_steps + rest;

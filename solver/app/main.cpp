@@ -19,6 +19,7 @@ First steps:
   mpirun -n 4 kuzure run SCENE.toml       the same on four ranks, with the same bits
   kuzure run SCENE.toml -o DIR --restart  go on from the newest good checkpoint
   kuzure report DIR                       DIR/report.html: one page with everything
+  kuzure picture DIR --color speed        other colours, another view, of what is there
   kuzure COMMAND --help                   the options of a command
 
 Exit codes: 0 done, 2 command line or scene wrong (nothing written), 3 the numbers failed,
@@ -36,6 +37,7 @@ int main(int argc, char** argv)
     add_run(app, chosen);
     add_check(app, chosen);
     add_report(app, chosen);
+    add_picture(app, chosen);
     add_job(app, chosen);
     add_study(app, chosen);
     add_reference(app, chosen);

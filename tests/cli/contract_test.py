@@ -72,13 +72,20 @@ try:
     snaps = sorted(glob.glob(out + "/snapshots/state_*.hdf"))
     check(len(snaps) == 3, f"three snapshots ({len(snaps)})")
     check(len(glob.glob(out + "/picture_*.png")) == 3, "three pictures")
+    with h5py.File(snaps[0]) as f, h5py.File(out + "/snapshots/walls.hdf") as walls:
+        points, data = f["VTKHDF/Points"], f["VTKHDF/PointData"]
+        check(points.shape == (512 + 3136, 3) and points.dtype == np.float64, "the first snapshot has float64 Points of soil and walls")
+        check(sorted(data["id"]) == list(range(512 + 3136)), "ids are 0 .. n-1")
+        kind = np.array(data["kind"])
+        check(int((kind == 0).sum()) == 512 and int((kind == 1).sum()) == 3136, "kind tells soil from wall")
+        check(np.array_equal(np.array(walls["VTKHDF/Points"]), np.array(points)[kind == 1]) and set(np.array(walls["VTKHDF/PointData/kind"])) == {1},
+              "walls.hdf has the walls alone")
     with h5py.File(snaps[-1]) as f:
         g = f["VTKHDF"]
         points, data = g["Points"], g["PointData"]
-        check(points.shape == (512 + 3136, 3) and points.dtype == np.float64, "Points are float64 of soil and walls")
+        check(points.shape == (512, 3) and points.dtype == np.float64, "later ones have soil only: walls do not move")
         check(set(data) >= {"id", "kind", "soil", "velocity", "stress", "density", "plastic_strain", "displacement"}, "PointData is complete")
-        check(data["id"].dtype == np.int64 and sorted(data["id"]) == list(range(512 + 3136)), "ids are 0 .. n-1")
-        check(int((np.array(data["kind"]) == 0).sum()) == 512, "kind tells soil from wall")
+        check(data["id"].dtype == np.int64 and sorted(data["id"]) == list(range(512)), "soil comes first in the ids")
         soil = np.array(data["kind"]) == 0
         stress = np.array(data["stress"])[soil]
         # sqrt(J2) + alpha I1 <= k: no snapshot shows a stress outside the cone

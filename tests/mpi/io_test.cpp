@@ -2,7 +2,7 @@
 #include "io/checkpoint.hpp"
 #include "io/hdf5.hpp"
 #include "io/history.hpp"
-#include "io/picture.hpp"
+#include "io/picture_series.hpp"
 #include "io/result_directory.hpp"
 #include "io/snapshot.hpp"
 #include "tests/mpi/world.hpp"
@@ -229,24 +229,32 @@ TEST_F(IoTest, HistoryIsWrittenOnceAndGoesOn)
     EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 5);
 }
 
-TEST_F(IoTest, ThePictureIsTheSameForAnyNumberOfRanks)
+TEST_F(IoTest, ThePicturesAreTheSameForAnyNumberOfRanks)
 {
     const std::int64_t n = 12 * 12 * 12, ranks = world().size(), me = world().rank();
-    const auto piece = [&](std::int64_t first, std::int64_t last) {
+    io::on_root(world(), [&] { std::filesystem::create_directory(dir / "snapshots"); });
+    io::Snapshots snapshots(world(), dir / "snapshots");
+    for (const double t : {0.0, 0.1, 0.2}) {
         Particles p;
-        p.require(field::origin);
+        p.require(field::origin, field::velocity, field::stress, field::density);
+        const auto first = n * me / ranks, last = n * (me + 1) / ranks;
         p.resize(Index(last - first));
         for (auto k = first; k < last; ++k)
-            p[field::position].set(Index(k - first), Vector{0.1 * double(k % 12), 0.1 * double(k / 12 % 12), 0.1 * double(k / 144)});
-        return p;
-    };
-    const io::PictureLabel label{{}, 3, {0, 0, 0}, {1.1, 1.1, 1.1}, 0.1, "the same", 0, {}, 480, 270};
-    io::write_picture(world(), dir / "many.png", piece(n * me / ranks, n * (me + 1) / ranks), {}, label);
-    if (me == 0) {
-        io::write_picture(Alone{}, dir / "one.png", piece(0, n), {}, label);
-        EXPECT_EQ(io::read_text(dir / "many.png"), io::read_text(dir / "one.png"));
+            p[field::position].set(Index(k - first),
+                                   Vector{0.1 * double(k % 12), 0.1 * double(k / 12 % 12), (0.1 - t / 3) * double(k / 144)});
+        snapshots.write(p, {}, {t, 0, 3, "the same", {}});
     }
-    const auto box = io::soil_extent(world(), piece(n * me / ranks, n * (me + 1) / ranks));
-    EXPECT_EQ(box.low, (Vector{0, 0, 0}));
-    EXPECT_EQ(box.high.z, 0.1 * 11);
+    io::PictureTask task;
+    task.results = dir, task.spacing = 0.1, task.title = "the same";
+    EXPECT_EQ(io::draw_pictures(world(), task).files.size(), 3u);
+    world().barrier();
+    if (me == 0)
+        for (int k = 0; k < 3; ++k) {
+            task.at = 0.1 * k;
+            task.file = [&](int) { return dir / "alone.png"; };
+            io::draw_pictures(Alone{}, task);
+            EXPECT_EQ(io::read_text(dir / "alone.png"), io::read_text(io::picture_file(dir, k)));
+        }
+    task.color = "sped"; // all ranks hear of it
+    EXPECT_THROW(io::draw_pictures(world(), task), BadInput);
 }

@@ -132,6 +132,26 @@ TEST_F(SnapshotTest, TheSeriesFollowsARestart)
     EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2"));
 }
 
+TEST_F(SnapshotTest, WallsAreWrittenOnce)
+{
+    {
+        io::Snapshots s(alone, dir);
+        for (const double t : {0.0, 0.1}) s.write(p, walls, {t, 0, 3, "", {}});
+    }
+    io::Snapshots again(alone, dir, 0.15);
+    again.write(p, walls, {0.2, 0, 3, "", {}, 11});
+    const auto kinds = [&](const char* file) { return read<std::int32_t>(io::H5Reader(dir / file), "PointData/kind", 1); };
+    EXPECT_THAT(kinds("state_000000.hdf"), ElementsAre(0, 0, 1));
+    EXPECT_THAT(kinds("state_000001.hdf"), ElementsAre(0, 0));
+    EXPECT_THAT(kinds("state_000002.hdf"), ElementsAre(0, 0));
+    EXPECT_THAT(kinds("walls.hdf"), ElementsAre(1));
+    EXPECT_THAT(read<double>(io::H5Reader(dir / "walls.hdf"), "Points", 3), ElementsAre(7, 8, 9));
+    EXPECT_FALSE(io::H5Reader(dir / "state_000001.hdf").has_attribute("/VTKHDF", "failed_particle"));
+    EXPECT_EQ(io::H5Reader(dir / "state_000002.hdf").integer("/VTKHDF", "failed_particle"), 11);
+    EXPECT_EQ(io::snapshot_number(dir / "state_000002.hdf"), 2);
+    EXPECT_FALSE(io::snapshot_number(dir / "walls.hdf"));
+}
+
 TEST_F(SnapshotTest, AFailureNamesFileAndCauseAndLeavesNothing)
 {
     try {

@@ -1,9 +1,10 @@
 // kuzure run: the run loop, and everything a run leaves in its directory.
 #include "io/checkpoint.hpp"
 #include "io/history.hpp"
-#include "io/picture.hpp"
+#include "io/picture_series.hpp"
 #include "io/result_directory.hpp"
 #include "io/snapshot.hpp"
+#include "io/soil_color.hpp"
 #include "io/summary.hpp"
 #include "perf/report.hpp"
 #include "solver/app/clock_text.hpp"
@@ -235,10 +236,7 @@ private:
         }
         if (due(scene_.output.every, t, before) || last || before < 0) {
             if (!snapshots_->last_time() || t > *snapshots_->last_time()) {
-                sim.timers().timed(Phase::Snapshot, [&] {
-                    snapshots_->write(sim.particles(), walls_, {t, sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields});
-                });
-                if (scene_.output.picture) sim.timers().timed(Phase::Picture, [&] { write_picture(snapshots_->count() - 1); });
+                sim.timers().timed(Phase::Snapshot, [&] { write_snapshot({}); });
             }
         }
     }
@@ -267,40 +265,37 @@ private:
                           sim_->max_speed(), heap.height, heap.min_x, heap.max_x, heap.min_y, heap.max_y, l.dissipated.stabilising, 0.0});
     }
 
-    void write_picture(int number)
+    void write_snapshot(std::optional<std::int64_t> failed)
     {
-        frame_ = io::soil_extent(comm_, sim_->particles());
-        write_picture(number, *frame_, {});
+        io::SnapshotLabel label{sim_->time(), sim_->steps(), scene_.dimensions, scene_.title, scene_.output.fields, failed};
+        // What colours the pictures is kept, asked for or not.
+        if (scene_.output.picture && !label.fields.empty())
+            if (const std::string behind = io::field_behind(scene_.output.picture->color); std::ranges::count(label.fields, behind) == 0)
+                label.fields.push_back(behind);
+        snapshots_->write(sim_->particles(), walls_, label);
     }
 
-    void write_picture(int number, const io::Extent& frame, std::optional<Vector> mark)
+    /// The pictures, from the snapshots and when the last of them is there: one camera and one range for all. Without them the results
+    /// are complete, so what the program cannot draw is said and nothing more.
+    void draw_pictures()
     {
-        io::PictureLabel label;
-        label.look = scene_.output.picture.value_or(scene::Picture{});
-        label.dimensions = scene_.dimensions;
-        label.low = frame.low, label.high = frame.high;
-        label.mark = mark;
-        label.spacing = scene_.space.spacing;
-        label.title = scene_.title;
-        label.time = sim_->time();
-        const auto& start = sim_->filling().soil_bounds();
-        label.middle_y = 0.5 * (start.low.y + start.high.y);
-        io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
+        if (!scene_.output.picture) return;
+        sim_->timers().timed(Phase::Picture, [&] {
+            try {
+                io::remove_pictures(comm_, dir_->path()); // also those of snapshots that a restart took back
+                auto task = picture_task(scene_, dir_->path());
+                task.tolerant = true;
+                for (const auto& w : io::draw_pictures(comm_, task).warnings) warn(w);
+            } catch (const BadInput& e) {
+                warn(e.what());
+            }
+        });
     }
 
-    /// Snapshot and picture of a state whose numbers failed, framed like the last good one: what broke may be anywhere.
+    /// Snapshot of a state whose numbers failed; its picture has a ring around the particle to blame.
     void keep_moment_of_failure()
     {
-        const auto& p = sim_->particles();
-        if (!snapshots_->last_time() || sim_->time() > *snapshots_->last_time())
-            snapshots_->write(p, walls_, {sim_->time(), sim_->steps(), scene_.dimensions, scene_.title, scene_.output.fields});
-        double at[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-        for (Index i = 0; i < p.size(); ++i)
-            if (p[field::id][i] == sim_->failed_id())
-                for (int c = 0; c < 3; ++c) at[c] = p[field::position].column[c][i];
-        comm_.max(std::span<double>(at));
-        const auto& start = sim_->filling().soil_bounds();
-        write_picture(snapshots_->count() - 1, frame_.value_or(io::Extent{start.low, start.high}), Vector{at[0], at[1], at[2]});
+        if (!snapshots_->last_time() || sim_->time() > *snapshots_->last_time()) write_snapshot(sim_->failed_id());
     }
 
     std::string last_good_checkpoint() const
@@ -345,6 +340,7 @@ private:
         const std::int64_t memory = comm_.max(std::int64_t(sim_->memory_bytes()));
         auto j = io::to_json(s);
         j["memory_bytes_per_rank"] = memory;
+        if (sim_->filling().wall_count() > 0) j["walls_in"] = {"snapshots/state_000000.hdf", "snapshots/walls.hdf"};
         j["rebuilds"] = sim_->rebuilds();
         j["repartitions"] = sim_->balance().cuts();
         j["repartitions_by_metis"] = sim_->balance().full_partitions();
@@ -462,6 +458,7 @@ private:
                 if (w.stop && !sim.finished()) {
                     write_checkpoint();
                     look(true);
+                    draw_pictures();
                     write_summary("stopped", Exit::Stopped);
                     write_report();
                     const auto text = fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)",
@@ -481,6 +478,7 @@ private:
                 keep_moment_of_failure();
                 text += fmt::format(". The moment is in the last snapshot of {}", dir_->snapshots().string());
                 text += last_good_checkpoint();
+                draw_pictures();
                 write_summary("numbers failed", Exit::NumbersFailed, text);
                 write_report();
             } catch (const IoFailed& io) {
@@ -493,6 +491,7 @@ private:
             throw IoFailed(e.what() + last_good_checkpoint());
         }
         look(true);
+        draw_pictures();
         write_summary("finished", Exit::Ok);
         write_report();
         say_end(fmt::format("{} steps in {:.1f} s ({:.2f} ms a step); energy residual {}", sim.steps() - first_step_, loop_seconds_,
@@ -522,7 +521,6 @@ private:
     double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, logged_wall_ = 0;
     std::optional<double> residual_; // of the last row of the history
     std::optional<Heap> heap_;
-    std::optional<io::Extent> frame_; // of the last regular picture
     Forecast forecast_;
     std::vector<std::string> warnings_;
     bool stop_file_ = false;

@@ -1,4 +1,5 @@
 #include "solver/app/report/movie.hpp"
+#include "io/picture_series.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cerrno>
@@ -50,10 +51,7 @@ io::Path write_movie(const io::Path& where)
 {
     const io::Path directory = std::filesystem::absolute(where);
     int pictures = 0;
-    for (const auto& e : std::filesystem::directory_iterator(directory)) {
-        const auto name = e.path().filename().string();
-        pictures += name.starts_with("picture_") && name.ends_with(".png");
-    }
+    for (const auto& e : std::filesystem::directory_iterator(directory)) pictures += io::picture_number(e.path()).has_value();
     if (pictures < 2)
         throw IoFailed(fmt::format("{}: a film needs two pictures or more, found {}. Remedy: [output] picture and a shorter every",
                                    directory.string(), pictures));
@@ -66,7 +64,7 @@ io::Path write_movie(const io::Path& where)
     for (const auto& [name, coding] : ways) {
         const std::string part = std::string("part_") + name;
         std::vector<std::string> words{
-            "ffmpeg", "-y", "-nostdin", "-framerate", rate, "-pattern_type", "glob", "-i", literal(directory) + "/picture_*.png"};
+            "ffmpeg", "-y", "-nostdin", "-framerate", rate, "-pattern_type", "glob", "-i", literal(directory) + "/picture_[0-9]*.png"};
         words.insert(words.end(), coding.begin(), coding.end());
         words.push_back((directory / part).string());
         const int code = ffmpeg(words);
@@ -80,7 +78,7 @@ io::Path write_movie(const io::Path& where)
     }
     throw IoFailed(
         fmt::format("{}: ffmpeg could make no film of the pictures. Remedy: try it by hand, ffmpeg -framerate {} -pattern_type glob "
-                    "-i 'picture_*.png' movie.mp4",
+                    "-i 'picture_[0-9]*.png' movie.mp4",
                     directory.string(), rate));
 }
 

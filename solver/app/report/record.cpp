@@ -1,4 +1,5 @@
 #include "solver/app/report/record.hpp"
+#include "io/picture_series.hpp"
 #include "io/scene_file.hpp"
 #include <algorithm>
 #include <charconv>
@@ -87,8 +88,7 @@ Record read_record(const io::Path& directory)
     }
     std::error_code error;
     for (const auto& e : std::filesystem::directory_iterator(directory, error)) {
-        const auto name = e.path().filename().string();
-        if (name.starts_with("picture_") && name.ends_with(".png") && e.file_size(error) > 0) r.pictures.push_back(e.path());
+        if (io::picture_number(e.path()) && e.file_size(error) > 0) r.pictures.push_back(e.path());
     }
     std::sort(r.pictures.begin(), r.pictures.end());
     // Pictures carry the number of their snapshot, whose time the series tells.

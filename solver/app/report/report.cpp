@@ -179,7 +179,9 @@ std::string opening(const Record& r)
 // ---- pictures and curves -------------------------------------------------------------------------------------------
 std::string pictures(const Record& r)
 {
-    if (r.pictures.empty()) return "<p class=\"soft\">None: the scene has no <code>picture</code> in [output].</p>\n";
+    if (r.pictures.empty())
+        return "<p class=\"soft\">None: the scene has no <code>picture</code> in [output], or the run has not come to its end. "
+               "<code>kuzure picture DIR</code> draws them from the snapshots.</p>\n";
     const std::size_t end = r.pictures.size() - 1;
     const bool failed = r.text("status") == "numbers failed";
     std::vector<std::size_t> show{0, end / 2, end};
