@@ -34,24 +34,34 @@ bool HdfDisk::read(std::uint64_t at, std::size_t count, void* into)
         }
         have += std::size_t(n);
     }
-    for (const Piece& p : written_) {
-        const auto first = std::max(at, p.at), last = std::min<std::uint64_t>(at + count, p.at + p.bytes.size());
-        if (first < last) std::memcpy(to + (first - at), p.bytes.data() + (first - p.at), std::size_t(last - first));
+    for (const auto& [start, bytes] : written_) {
+        const auto first = std::max(at, start), last = std::min<std::uint64_t>(at + count, start + bytes.size());
+        if (first < last) std::memcpy(to + (first - at), bytes.data() + (first - start), std::size_t(last - first));
     }
     return true;
 }
 
 void HdfDisk::write(std::uint64_t at, std::size_t count, const void* from)
 {
-    const auto* bytes = static_cast<const std::byte*>(from);
-    written_.push_back({at, {bytes, bytes + count}});
+    // What it overlaps or touches becomes one piece with it: few writes to the disk, of each byte the last.
+    std::uint64_t first = at, last = at + count;
+    auto begin = written_.upper_bound(at);
+    if (begin != written_.begin() && std::prev(begin)->first + std::prev(begin)->second.size() >= at) --begin;
+    auto end = begin;
+    for (; end != written_.end() && end->first <= at + count; ++end)
+        first = std::min(first, end->first), last = std::max<std::uint64_t>(last, end->first + end->second.size());
+    std::vector<std::byte> whole(last - first);
+    for (auto p = begin; p != end; ++p) std::copy(p->second.begin(), p->second.end(), whole.begin() + std::ptrdiff_t(p->first - first));
+    std::memcpy(whole.data() + (at - first), from, count);
+    written_.erase(begin, end);
+    written_.emplace(first, std::move(whole));
     end_ = std::max(end_, at + count);
 }
 
 int HdfDisk::write_out()
 {
-    for (const Piece& p : written_)
-        if (const int error = write_all(descriptor_, p.bytes.data(), p.bytes.size(), std::int64_t(p.at))) return error;
+    for (const auto& [start, bytes] : written_)
+        if (const int error = write_all(descriptor_, bytes.data(), bytes.size(), std::int64_t(start))) return error;
     return ::ftruncate(descriptor_, off_t(end_)) == 0 ? 0 : errno;
 }
 

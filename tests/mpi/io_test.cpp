@@ -207,7 +207,7 @@ TEST_F(IoTest, ASnapshotOfManyRanksIsOneGrid)
 
     io::Snapshots again(world(), dir, 0.4);
     EXPECT_FALSE(again.last_time());
-    EXPECT_FALSE(std::filesystem::exists(file));
+    EXPECT_FALSE(io::exists(file));
 }
 
 TEST_F(IoTest, HistoryIsWrittenOnceAndGoesOn)

@@ -64,9 +64,16 @@ public:
 
     Exit go()
     {
-        open();
-        if (args_.twins) run_twins();
-        return loop();
+        try {
+            open();
+            if (args_.twins) run_twins();
+            return loop();
+        } catch (const io::CheckpointFailed&) {
+            throw; // says itself which one is good
+        } catch (const IoFailed& e) {
+            if (!sim_) throw;
+            throw IoFailed(e.what() + last_good_checkpoint());
+        }
     }
 
 private:
@@ -161,10 +168,11 @@ private:
             restart_time = clock.time;
             require_sound_state(comm_, *from, p, scene_, *options.filling);
             const auto fields = field_names(p);
+            checkpoint_ = from->file;
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
             require_fields(comm_, *from, fields, sim_->particles());
             dir_->make(io::Existing::GoOn);
-            checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
+            if (here) checkpoint_ = io::keep_generation(comm_, *from);
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
             if (const auto writer = other_writer(*from); !writer.empty())
                 warn(fmt::format("this checkpoint was written by {}; this is {}: the bits from here on may be others", writer,
@@ -490,10 +498,6 @@ private:
                 text += fmt::format(". It could not be saved: {}", io.what());
             }
             throw NumbersFailed(text);
-        } catch (const io::CheckpointFailed&) {
-            throw; // says itself which one is good
-        } catch (const IoFailed& e) {
-            throw IoFailed(e.what() + last_good_checkpoint());
         }
         look(true);
         write_summary("finished", Exit::Ok);
