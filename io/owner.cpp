@@ -313,9 +313,10 @@ bool Ownership::stands() const
 
 bool Ownership::lost() const
 {
-    const auto found = find(file_);
+    auto found = find(file_);
     if (!found && make(file_, mine_)) return false; // removed by hand
-    return !stands();
+    if (!found) found = find(file_);
+    return !found || found->text != mine_;
 }
 
 void Ownership::refuse_if_owned(const Place& directory)

@@ -16,7 +16,7 @@ class Campaign:
         self.place = place
         # Without MPI's helper process a start takes a third of the time.
         self.environment = {**place.environment, "OMPI_MCA_ess_singleton_isolated": "1"}
-        self.scene = place.write("scene.toml", scene_text(end=2e-4, every=2e-4, checkpoint=1e-6))
+        self.scene = place.write("scene.toml", scene_text(end=2e-4, every=2e-4, checkpoint=1e-6) + 'fields = ["velocity"]\n')
         self.record = {"injected": 0, "exit 0": 0, "exit 4": 0, "survived": 0}
         self.go("fresh")
         self.go("half", "--set", "time.end=1e-4")
@@ -95,5 +95,6 @@ class Campaign:
                     for error, times in choose(k, kind):
                         self.one(how, kind, n, error, times)
                     k += 1
+                print(how, kind, json.dumps(self.record), flush=True)
         check(self.record["survived"] == self.record["injected"], json.dumps(self.record))
         return self.record
