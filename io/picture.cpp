@@ -339,7 +339,7 @@ Extent soil_extent(const Team& team, const Particles& p)
     return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-void write_picture(const Team& team, const Path& file, const Particles& p, const WallPoints& walls, const PictureLabel& label)
+void write_picture(const Team& team, const Place& file, const Particles& p, const WallPoints& walls, const PictureLabel& label)
 {
     ensure(label.spacing > 0, "a picture needs the particles' spacing");
     const bool flat = label.dimensions == 2;

@@ -32,6 +32,6 @@ Extent soil_extent(const Team&, const Particles&);
 /// plastic strain nobody carries is zero, a value that is no number red. What lies far outside the frame is left out.
 /// Memory: 8 bytes x 4
 /// samples x a tenth of the picture, on every rank. Throws IoFailed.
-void write_picture(const Team&, const Path& file, const Particles&, const WallPoints&, const PictureLabel&);
+void write_picture(const Team&, const Place& file, const Particles&, const WallPoints&, const PictureLabel&);
 
 } // namespace kuzure::io

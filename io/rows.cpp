@@ -13,7 +13,7 @@ struct Kept {
     std::size_t bytes;
     std::optional<double> last_time;
 };
-Kept up_to(const std::string& all, const std::string& names, double time, const Path& file)
+Kept up_to(const std::string& all, const std::string& names, double time, const Place& file)
 {
     if (all.compare(0, names.size(), names) != 0)
         throw IoFailed(fmt::format("{}: this is no table of this version of kuzure (its first line differs): move it "
@@ -38,14 +38,14 @@ Kept up_to(const std::string& all, const std::string& names, double time, const 
 
 } // namespace
 
-Rows::Rows(const Team& team, const Path& file, std::string names, const std::string& units, std::optional<double> restart_time)
+Rows::Rows(const Team& team, const Place& file, std::string names, const std::string& units, std::optional<double> restart_time)
     : team_(team), file_(file)
 {
     names += '\n';
     on_root(team, [&] {
         std::string start = names + units + '\n';
         bool write = true;
-        if (restart_time && std::filesystem::exists(file)) {
+        if (restart_time && exists(file)) {
             std::string all = read_text(file);
             const Kept kept = up_to(all, names, *restart_time, file);
             last_time_ = kept.last_time;
@@ -56,16 +56,11 @@ Rows::Rows(const Team& team, const Path& file, std::string names, const std::str
             }
         }
         if (write) write_atomically(file, start);
-        fd_ = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+        fd_ = open_file(file, O_WRONLY | O_APPEND);
         if (fd_ < 0) throw IoFailed(fmt::format("{}: opening failed: {}", file.string(), cause(file, errno)));
     });
     double t = team.max(last_time_.value_or(-HUGE_VAL));
     if (t != -HUGE_VAL) last_time_ = t;
-}
-
-Rows::~Rows()
-{
-    if (fd_ >= 0) ::close(fd_);
 }
 
 void Rows::append(double time, const std::string& row)

@@ -45,10 +45,10 @@ void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scen
 {
     const std::string hash = io::scene_hash(scene);
     if (from.scene_hash == hash) return;
-    const io::Path beside = io::directory_of(from.file) / "scene.toml";
+    const io::Place beside = io::directory_of(from.file) / "scene.toml";
     std::string differs;
     try {
-        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside, {}, scene::StepLimit::Force), scene);
+        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside.path(), {}, scene::StepLimit::Force), scene);
     } catch (const std::runtime_error&) { // not there, or not readable any more: the hashes have to do
     }
     differs = comm.broadcast(differs);
@@ -62,6 +62,15 @@ void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scen
         text += fmt::format("It was written by {}; this is {}, which may know other keys. Remedy: go on with the program that wrote it",
                             writer, version_text());
     throw BadInput(text);
+}
+
+void complain(const std::string& text) noexcept
+{
+    try {
+        const std::string line = "kuzure: " + text + "\n"; // one write: lines of several processes stay whole
+        std::fwrite(line.data(), 1, line.size(), stderr);  // not by fmt, which throws
+    } catch (const std::bad_alloc&) {
+    }
 }
 
 std::string packages_text() { return fmt::format("{}, {}, {}", Comm::library(), io::hdf5_library(), partitioner_library()); }

@@ -46,6 +46,9 @@ void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);
 
+/// A line for whoever runs the program, on standard error. Never throws: where nobody can read it, the work goes on.
+void complain(const std::string& text) noexcept;
+
 /// The program's version, git hash, compiler and instruction set.
 std::string version_text();
 /// The libraries that its answers rest on, and their versions.

@@ -1,6 +1,8 @@
 // Arguments, MPI on and off, exit codes. What a command does stands in solver/app/commands.
+#include "io/hdf5.hpp"
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
+#include "solver/app/signals.hpp"
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
@@ -28,6 +30,8 @@ Exit codes: 0 done, 2 command line or scene wrong (nothing written), 3 the numbe
 
 int main(int argc, char** argv)
 {
+    listen_to_signals();
+    io::quiet_hdf5(); // before MPI
     CLI::App app{"kuzure: soil that collapses under its own weight"};
     app.set_version_flag("--version", [] { return version_text() + "\n" + packages_text(); });
     app.require_subcommand(1);
@@ -55,8 +59,9 @@ int main(int argc, char** argv)
         if (speaks) std::fprintf(stderr, "kuzure: %s\nsee kuzure --help\n", e.what());
         return int(Exit::BadInput);
     }
+    if (!app.got_subcommand("run")) stop_listening();
     const auto fail = [&](const char* what, Exit code) {
-        if (speaks) std::fprintf(stderr, "kuzure: %s\n", what);
+        if (speaks) complain(what);
         return int(code);
     };
     try {

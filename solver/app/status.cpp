@@ -76,15 +76,18 @@ void StatusLine::show(const Status& s, bool final)
     last_ = t, time_ = s.time, step_ = s.step;
     const double done = std::clamp(s.time / end_, 0.0, 1.0);
     std::string line = text(s, end_, rate, left);
-    if (!bar_) fmt::print("{:3.0f} %  {}\n", 100 * done, line);
+    // Not by fmt's print, which throws: a run goes on when nobody can read how far it is.
+    if (!bar_) std::fputs(fmt::format("{:3.0f} %  {}\n", 100 * done, line).c_str(), stdout);
     else {
         winsize size{};
         const int columns = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
         const int width = columns >= 140 ? 20 : 10, full = int(done * width);
         // Longer than the terminal is wide, it could not renew itself.
         line = cut(line, std::size_t(std::max(0, columns - width - 4)));
-        fmt::print("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'), line,
-                   final ? "\n" : "");
+        std::fputs(fmt::format("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'),
+                               line, final ? "\n" : "")
+                       .c_str(),
+                   stdout);
         standing_ = !final;
     }
     std::fflush(stdout);
@@ -100,7 +103,7 @@ std::string StatusLine::cut(const std::string& text, std::size_t columns)
 void StatusLine::make_room()
 {
     if (!standing_) return;
-    fmt::print("\r\x1b[K");
+    std::fputs("\r\x1b[K", stdout);
     std::fflush(stdout);
     standing_ = false;
 }

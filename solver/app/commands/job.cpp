@@ -340,8 +340,7 @@ void add_job(CLI::App& app, Action& chosen)
             const Plan p = make_plan(comm, *a);
             if (comm.rank() != 0) return Exit::Ok;
             if (p.machine.needs_account && a->account.empty())
-                fmt::print(stderr, "kuzure: jobs on {} need a project: write yours instead of PROJECT, or give --account\n",
-                           p.machine.name);
+                complain(fmt::format("jobs on {} need a project: write yours instead of PROJECT, or give --account", p.machine.name));
             fmt::print("{}{}", header(p, *a), body(p, *a));
             return Exit::Ok;
         };

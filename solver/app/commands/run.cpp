@@ -14,6 +14,8 @@
 #include "solver/app/measure.hpp"
 #include "solver/app/report/movie.hpp"
 #include "solver/app/report/report.hpp"
+#include "solver/app/signals.hpp"
+#include "solver/app/sound_state.hpp"
 #include "solver/app/status.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/core/simd.hpp"
@@ -21,7 +23,6 @@
 #include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <csignal>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
@@ -40,9 +41,6 @@ struct Arguments {
     int recut_every = 0;
     bool twins = false;
 };
-
-volatile std::sig_atomic_t asked_to_stop = 0;
-void on_signal(int) { asked_to_stop = 1; }
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -66,9 +64,16 @@ public:
 
     Exit go()
     {
-        open();
-        if (args_.twins) run_twins();
-        return loop();
+        try {
+            open();
+            if (args_.twins) run_twins();
+            return loop();
+        } catch (const io::CheckpointFailed&) {
+            throw; // says itself which one is good
+        } catch (const IoFailed& e) {
+            if (!sim_) throw;
+            throw IoFailed(e.what() + last_good_checkpoint());
+        }
     }
 
 private:
@@ -126,7 +131,7 @@ private:
     void warn(const std::string& text)
     {
         warnings_.push_back(text);
-        if (comm_.rank() == 0 && !twin_) fmt::print(stderr, "kuzure: warning: {}\n", text);
+        if (comm_.rank() == 0 && !twin_) complain("warning: " + text);
     }
 
     void open()
@@ -134,15 +139,18 @@ private:
         for (const auto& issue : doubts_) warn(in_words(issue));
         const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
+        // From here on no other run touches what is there.
+        const auto existing = args_.restart ? io::Existing::GoOn : args_.force ? io::Existing::MoveAside : io::Existing::Refuse;
+        dir_.emplace(comm_, where, existing, complain);
         if (args_.restart) {
             if (!args_.restart->empty()) from = io::verify_checkpoint(comm_, *args_.restart);
-            else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
+            else from = io::newest_good(comm_, dir_->place(), complain);
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
         bool here = true; // of another directory nothing is touched
         if (from) {
             std::error_code error;
-            here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file), error));
+            here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file).path(), error));
             require_same_scene(comm_, *from, scene_);
             if (!here) require_room_for(*from, where);
         }
@@ -155,20 +163,24 @@ private:
         std::optional<double> restart_time;
         if (from) {
             Particles p;
-            io::read_checkpoint(comm_, from->file, p);
+            io::read_checkpoint(comm_, *from, p);
             const Clock clock = clock_from_text(from->header, from->file);
             restart_time = clock.time;
-            dir_.emplace(comm_, where, io::Existing::GoOn);
-            checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
+            require_sound_state(comm_, *from, p, scene_, *options.filling);
+            const auto fields = field_names(p);
+            checkpoint_ = from->file;
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
+            require_fields(comm_, *from, fields, sim_->particles());
+            dir_->make(io::Existing::GoOn);
+            if (here) checkpoint_ = io::keep_generation(comm_, *from);
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
             if (const auto writer = other_writer(*from); !writer.empty())
                 warn(fmt::format("this checkpoint was written by {}; this is {}: the bits from here on may be others", writer,
                                  version_text()));
         } else {
-            dir_.emplace(comm_, where, args_.force || args_.restart ? io::Existing::MoveAside : io::Existing::Refuse);
+            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options)); // what it refuses leaves nothing behind
+            dir_->make(args_.restart ? io::Existing::MoveAside : existing);
             if (!dir_->moved_to().empty()) say(fmt::format("the old results are now in {}", dir_->moved_to().string()));
-            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options));
         }
         io::on_root(comm_, [&] {
             char host[256] = "";
@@ -176,8 +188,7 @@ private:
             io::write_atomically(dir_->scene(),
                                  fmt::format("# {}\n# host {}, {} ranks x {} threads, scene hash {}, pair model {}\n{}", version_text(),
                                              host, comm_.size(), threads_, hash_, sim_->model().name(), io::write_scene(scene_)));
-            std::filesystem::create_directories(dir_->snapshots());
-            std::filesystem::remove(dir_->stop());
+            io::remove_file(dir_->stop());
         });
         walls_ = wall_share(comm_, sim_->filling(), {sim_->soils().begin(), sim_->soils().end()});
         snapshots_.emplace(comm_, dir_->snapshots(), restart_time);
@@ -285,7 +296,7 @@ private:
         label.time = sim_->time();
         const auto& start = sim_->filling().soil_bounds();
         label.middle_y = 0.5 * (start.low.y + start.high.y);
-        io::write_picture(comm_, dir_->path() / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
+        io::write_picture(comm_, *dir_ / fmt::format("picture_{:06d}.png", number), sim_->particles(), walls_, label);
     }
 
     /// Snapshot and picture of a state whose numbers failed, framed like the last good one: what broke may be anywhere.
@@ -312,7 +323,8 @@ private:
     {
         sim_->timers().timed(Phase::Checkpoint, [&] {
             history_->sync();
-            checkpoint_ = io::write_checkpoint(comm_, dir_->path(), sim_->particles(), hash_, clock_text(*sim_));
+            dir_->require_owned();
+            checkpoint_ = io::write_checkpoint(comm_, dir_->place(), sim_->particles(), hash_, clock_text(*sim_));
         });
         last_checkpoint_ = now();
     }
@@ -366,8 +378,8 @@ private:
         if (comm_.rank() == 0) report.machine = kept_machine(instruction_set(), on_node);
         if (!report.machine && comm_.size() == 1 && loop_seconds_ > 20) report.machine = this_machine(instruction_set(), on_node);
         io::on_root(comm_, [&] {
-            io::write_atomically(dir_->path() / "timers.json", report.json());
-            io::write_atomically(dir_->path() / "timers.txt", report.text());
+            io::write_atomically(*dir_ / "timers.json", report.json());
+            io::write_atomically(*dir_ / "timers.txt", report.text());
         });
     }
 
@@ -375,15 +387,16 @@ private:
     void write_report()
     {
         if (comm_.rank() != 0) return;
+        if (!dir_->in_place()) return complain(fmt::format("warning: no report.html: {} was moved meanwhile", dir_->path().string()));
         try {
             if (scene_.output.movie) say(fmt::format("film: {}", report::write_movie(dir_->path()).string()));
         } catch (const std::exception& e) {
-            fmt::print(stderr, "kuzure: warning: {}\n", e.what());
+            complain(fmt::format("warning: {}", e.what()));
         }
         try {
             report::write_report(dir_->path());
         } catch (const std::exception& e) {
-            fmt::print(stderr, "kuzure: warning: no report.html: {}\n", e.what());
+            complain(fmt::format("warning: no report.html: {}", e.what()));
         }
     }
 
@@ -402,12 +415,11 @@ private:
     {
         Requests w;
         const double t = now();
-        w.stop = asked_to_stop != 0 || (args_.max_minutes > 0 && t - start_ > 60 * args_.max_minutes);
+        w.stop = asked_to_stop() || (args_.max_minutes > 0 && t - start_ > 60 * args_.max_minutes);
         if (comm_.rank() == 0) {
             if (t - last_look_ > 1) {
                 last_look_ = t;
-                std::error_code ignored;
-                stop_file_ = std::filesystem::exists(dir_->stop(), ignored);
+                stop_file_ = io::exists(dir_->stop()) || !dir_->owned();
             }
             w.stop = w.stop || stop_file_;
             w.checkpoint = t - last_checkpoint_ > 60 * scene_.output.checkpoint_minutes;
@@ -437,7 +449,6 @@ private:
 
     Exit loop()
     {
-        std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
         Simulation& sim = *sim_;
         status_.emplace(speaks_, scene_.time.end, sim.time(), sim.steps());
         const auto look = [&](bool final) {
@@ -466,7 +477,7 @@ private:
                     write_report();
                     const auto text = fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)",
                                                   sim.time(), sim.steps(), checkpoint_.string());
-                    if (args_.quiet && comm_.rank() == 0) std::fprintf(stderr, "kuzure: %s\n", text.c_str());
+                    if (args_.quiet && comm_.rank() == 0) complain(text);
                     say(text);
                     return Exit::Stopped;
                 }
@@ -487,10 +498,6 @@ private:
                 text += fmt::format(". It could not be saved: {}", io.what());
             }
             throw NumbersFailed(text);
-        } catch (const io::CheckpointFailed&) {
-            throw; // says itself which one is good
-        } catch (const IoFailed& e) {
-            throw IoFailed(e.what() + last_good_checkpoint());
         }
         look(true);
         write_summary("finished", Exit::Ok);
@@ -518,7 +525,7 @@ private:
     std::optional<io::Snapshots> snapshots_;
     std::optional<io::History> history_;
     std::optional<io::ProgressLog> progress_;
-    io::Path checkpoint_;
+    io::Place checkpoint_;
     double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, logged_wall_ = 0;
     std::optional<double> residual_; // of the last row of the history
     std::optional<Heap> heap_;

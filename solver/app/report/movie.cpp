@@ -69,8 +69,9 @@ io::Path write_movie(const io::Path& where)
             "ffmpeg", "-y", "-nostdin", "-framerate", rate, "-pattern_type", "glob", "-i", literal(directory) + "/picture_*.png"};
         words.insert(words.end(), coding.begin(), coding.end());
         words.push_back((directory / part).string());
-        const int code = ffmpeg(words);
         std::error_code ignored;
+        std::filesystem::remove(directory / part, ignored); // what lies there may be a link
+        const int code = ffmpeg(words);
         if (code == 0) {
             for (const auto& way : ways) std::filesystem::remove(directory / way.first, ignored);
             std::filesystem::rename(directory / part, directory / name);

@@ -47,7 +47,23 @@ std::string Record::text(const char* key) const
 
 Record read_record(const io::Path& directory)
 {
-    const auto there = [&](const char* name) { return std::filesystem::exists(directory / name); };
+    // Held: nothing is read through links, which in a directory from somebody else may lead to anything of ours.
+    io::Place held;
+    try {
+        held = io::hold(directory);
+    } catch (const IoFailed&) { // not there, or no directory: said below
+    }
+    const auto place = [&](const std::string& name) {
+        const auto slash = name.find('/');
+        return slash == name.npos ? held / name : io::hold(held / name.substr(0, slash)) / name.substr(slash + 1);
+    };
+    const auto there = [&](const char* name) {
+        try {
+            return held.held() && io::exists(place(name));
+        } catch (const IoFailed&) {
+            return false;
+        }
+    };
     if (!there("summary.json") && !there("scene.toml"))
         throw BadInput(
             fmt::format("{}: neither summary.json nor scene.toml here. Expected: the result directory of a run", directory.string()));
@@ -55,7 +71,7 @@ Record read_record(const io::Path& directory)
     r.directory = directory;
     const auto text = [&](const char* name, const char* meaning) -> std::string {
         try {
-            if (there(name)) return io::read_text(directory / name);
+            if (there(name)) return io::read_text(place(name));
             r.gaps.push_back(fmt::format("{} is missing: {}.", name, meaning));
         } catch (const IoFailed& e) {
             r.gaps.push_back(e.what());
@@ -88,7 +104,8 @@ Record read_record(const io::Path& directory)
     std::error_code error;
     for (const auto& e : std::filesystem::directory_iterator(directory, error)) {
         const auto name = e.path().filename().string();
-        if (name.starts_with("picture_") && name.ends_with(".png") && e.file_size(error) > 0) r.pictures.push_back(e.path());
+        if (name.starts_with("picture_") && name.ends_with(".png") && !e.is_symlink(error) && e.file_size(error) > 0)
+            r.pictures.push_back(e.path());
     }
     std::sort(r.pictures.begin(), r.pictures.end());
     // Pictures carry the number of their snapshot, whose time the series tells.
@@ -106,7 +123,7 @@ Record read_record(const io::Path& directory)
         r.picture_times.push_back(at == times.end() ? std::nan("") : at->second);
     }
     for (const char* name : {"movie.mp4", "movie.webm", "movie.gif"})
-        if (r.movie.empty() && there(name)) r.movie = directory / name;
+        if (r.movie.empty() && there(name) && !std::filesystem::is_symlink(directory / name, error)) r.movie = directory / name;
     return r;
 }
 

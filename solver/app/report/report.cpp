@@ -196,7 +196,7 @@ std::string pictures(const Record& r)
         const std::string caption = std::isfinite(t) ? fmt::format("{}, t = {:.4g} s", which, t) : which;
         try {
             s += fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
-                             data_uri("image/png", io::read_text(r.pictures[k])));
+                             data_uri("image/png", io::read_text(io::hold(r.directory) / r.pictures[k].filename().string())));
         } catch (const IoFailed& e) {
             s += "<p>" + escaped(e.what()) + "</p>";
         }
@@ -204,7 +204,10 @@ std::string pictures(const Record& r)
     if (!r.movie.empty()) {
         try {
             const bool gif = r.movie.extension() == ".gif", webm = r.movie.extension() == ".webm";
-            const std::string uri = data_uri(gif ? "image/gif" : webm ? "video/webm" : "video/mp4", io::read_text(r.movie));
+            const std::string uri = data_uri(gif    ? "image/gif"
+                                             : webm ? "video/webm"
+                                                    : "video/mp4",
+                                             io::read_text(io::hold(r.directory) / r.movie.filename().string()));
             s += gif ? fmt::format("<figure><img alt=\"animation\" src=\"{}\"><figcaption>all pictures</figcaption></figure>\n", uri)
                      : fmt::format("<figure><video controls loop muted src=\"{}\"></video><figcaption>all pictures</figcaption></figure>\n",
                                    uri);
