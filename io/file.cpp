@@ -111,7 +111,8 @@ void write_atomically(const Path& path, std::string_view content)
 
 std::string read_text(const Path& path, std::uint64_t limit)
 {
-    const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    // A pipe that nobody writes to must not hold us up; on files this says nothing.
+    const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (in.fd < 0) fail(path, "opening", errno);
     struct stat info;
     if (::fstat(in.fd, &info) != 0) fail(path, "reading", errno);
