@@ -2,6 +2,7 @@
 #include "solver/core/field.hpp"
 #include "solver/scene/at_rest.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/nearby.hpp"
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
@@ -584,13 +585,12 @@ void check_edges(const Scene& scene, Rules& rules)
     if (!scene.effects.gravity || !(scene.effects.gravity->z < 0) || scene.walls.empty()) return;
     const double dx = scene.space.spacing, reach = scene.support();
     const bool flat = scene.dimensions == 2;
-    std::vector<Box> around;
-    for (const auto& wall : scene.walls) around.push_back(bounds(wall.shape));
+    const Nearby walls = nearby(scene.walls, scene.dimensions), bodies = nearby(scene.bodies, scene.dimensions);
     const auto in_wall = [&](Vector x) {
-        for (std::size_t w = 0; w < around.size(); ++w)
-            if (contact(around[w], x, scene.dimensions).distance <= 0 && signed_distance(scene.walls[w].shape, x, scene.dimensions) <= 0)
-                return true;
-        return false;
+        return walls.any(x, [&](std::size_t w) { return signed_distance(scene.walls[w].shape, x, scene.dimensions) <= 0; });
+    };
+    const auto in_body = [&](Vector x) {
+        return bodies.any(x, [&](std::size_t k) { return contains(scene.bodies[k].shape, x, scene.dimensions); });
     };
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const Box body = bounds(scene.bodies[b].shape);
@@ -612,8 +612,7 @@ void check_edges(const Scene& scene, Rules& rules)
                     bool held = false;
                     for (double beyond = 0.5 * dx; beyond <= reach && !held; beyond += 0.5 * dx) {
                         const Vector x = at(beyond, along, foot);
-                        held = in_wall(x) || std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                                         [&](const Body& other) { return contains(other.shape, x, scene.dimensions); });
+                        held = in_wall(x) || in_body(x);
                     }
                     open = open || !held;
                 }
