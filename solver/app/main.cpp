@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <fmt/format.h>
 #include <system_error>
 
@@ -39,6 +41,26 @@ int said(int code)
     return code;
 }
 
+void say_no_memory(int rank)
+{
+    std::fprintf(stderr, "kuzure: rank %d has no more memory. Remedy: more ranks on more nodes, a larger spacing\n", rank);
+}
+
+/// What a loop of several threads throws cannot leave it: memory may end there too.
+[[noreturn]] void on_terminate()
+{
+    try {
+        if (const auto e = std::current_exception()) std::rethrow_exception(e);
+    } catch (const std::bad_alloc&) {
+        say_no_memory(launched().rank);
+        std::_Exit(int(Exit::IoFailed)); // mpirun ends the other ranks
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "kuzure: rank %d: %s (a defect of kuzure: please report it)\n", launched().rank, e.what());
+    } catch (...) {
+    }
+    std::abort();
+}
+
 /// The chosen command on a team. Every rank has the same arguments.
 int carry_out(const Action& chosen, const Comm& comm, bool words_count)
 {
@@ -59,7 +81,7 @@ int carry_out(const Action& chosen, const Comm& comm, bool words_count)
         if (comm.size() > 1) comm.abort(int(Exit::IoFailed));
         return int(Exit::IoFailed);
     } catch (const std::bad_alloc&) {
-        std::fprintf(stderr, "kuzure: rank %d has no more memory. Remedy: more ranks on more nodes, a larger spacing\n", comm.rank());
+        say_no_memory(comm.rank());
         comm.abort(int(Exit::IoFailed));
     } catch (const std::exception& e) {
         std::fprintf(stderr, "kuzure: rank %d: %s (a defect of kuzure: please report it)\n", comm.rank(), e.what());
@@ -71,6 +93,7 @@ int carry_out(const Action& chosen, const Comm& comm, bool words_count)
 
 int main(int argc, char** argv)
 {
+    std::set_terminate(on_terminate);
     CLI::App app{"kuzure: soil that collapses under its own weight", "kuzure"};
     app.set_version_flag("-V,--version", [] { return version_text() + "\n" + packages_text(); });
     app.require_subcommand(1);
