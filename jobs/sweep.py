@@ -73,9 +73,10 @@ def read_sweep(path):
     def check(table, where):
         for key in table:
             if key not in KEYS[where]:
-                near = difflib.get_close_matches(key, KEYS[where], 1, 0) or KEYS[where]
+                near = difflib.get_close_matches(key, KEYS[where], 1)
                 line = next((k for k, text in enumerate(open(path), 1) if text.strip().startswith(key)), 1)
-                raise Wrong(f'{path}:{line}: {key}: expected a known key, found "{key}"; did you mean "{near[0]}"? Known here: {", ".join(KEYS[where])}')
+                meant = f'; did you mean "{near[0]}"?' if near else "."
+                raise Wrong(f'{path}:{line}: {key}: expected a known key, found "{key}"{meant} Known here: {", ".join(KEYS[where])}')
             good, what = VALUES[key](table[key])
             if not good:
                 raise Wrong(f"{path}: {where + '.' if where else ''}{key}: expected {what}, found {table[key]!r:.60}")
