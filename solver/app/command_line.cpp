@@ -286,6 +286,9 @@ stopped on request, with a checkpoint
 .B OMP_NUM_THREADS
 threads of each rank, where \-\-threads is not given
 .TP
+.B KUZURE_MPI
+1: a launcher started this process as one of several ranks, whether or not it is recognised; 0: none did
+.TP
 .B KUZURE_ISA
 of an installed package: x86\-64, x86\-64\-v3 or x86\-64\-v4 in place of the best this processor has
 .SH "SEE ALSO"
@@ -358,7 +361,7 @@ CommandLine parse(CLI::App& app, int argc, char** argv)
     CommandLine given;
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     if (words.empty()) {
-        given.helpless = true, given.text = app.help();
+        given.helpless = true, given.wrong = "expected a command, found none", given.text = app.help();
         return given;
     }
     if (words[0] == "help") { // kuzure help run
@@ -376,7 +379,7 @@ CommandLine parse(CLI::App& app, int argc, char** argv)
         std::ostringstream out, ignored;
         if (e.get_exit_code() == 0) {
             app.exit(e, out, ignored);
-            given.shown = true, given.text = out.str();
+            given.shown = true, given.text = out.str(), given.words = words;
             return given;
         }
         given.wrong = e.what();

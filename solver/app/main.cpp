@@ -1,4 +1,5 @@
 // Arguments, MPI on and off, exit codes. What a command does stands in solver/app/commands.
+#include "decomposition/launcher.hpp"
 #include "io/quote.hpp"
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
@@ -109,18 +110,14 @@ int main(int argc, char** argv)
     add_completion(app, chosen);
     app.footer(help_footer); // last: commands added after it would show it too
 
-    // Words first, MPI afterwards and only for what works on ranks: help and checks must not depend on it.
+    // Words first, MPI afterwards and only for what works on ranks: help and checks must not depend on it. Where ranks were given
+    // different command lines, another's may be a run that waits for this one.
     const CommandLine given = parse(app, argc, argv);
     const Launched by = launched();
-    const bool first = by.rank == 0;
-    if (given.shown) return first ? (std::fputs(given.text.c_str(), stdout), said(0)) : 0;
-    if (given.helpless) { // nothing was asked
-        if (first) std::fputs(given.text.c_str(), stdout), std::fflush(stdout);
-        return first ? fail("expected a command, found none", Exit::BadInput) : int(Exit::BadInput);
-    }
-    if (!by || !given.on_ranks) {
-        if (!given.wrong.empty()) return first ? fail(given.wrong.c_str(), Exit::BadInput) : int(Exit::BadInput);
-        if (!first) return 0; // one of the ranks does the work
+    if (!by || !(given.on_ranks || several_command_lines())) {
+        if (by.rank != 0) return given.wrong.empty() ? 0 : int(Exit::BadInput); // one of the ranks does the work
+        if (given.shown) return (std::fputs(given.text.c_str(), stdout), said(0));
+        if (!given.wrong.empty()) return (std::fputs(given.text.c_str(), stdout), fail(given.wrong.c_str(), Exit::BadInput));
         const Environment alone;
         return carry_out(chosen, Comm::world(), !given.on_ranks);
     }
@@ -131,5 +128,6 @@ int main(int argc, char** argv)
     } catch (const BadInput& e) {
         return comm.rank() == 0 ? fail(e.what(), Exit::BadInput) : int(Exit::BadInput);
     }
-    return carry_out(chosen, comm, false);
+    if (given.shown) return comm.rank() == 0 ? (std::fputs(given.text.c_str(), stdout), said(0)) : 0;
+    return carry_out(chosen, comm, !given.on_ranks);
 }

@@ -132,6 +132,8 @@ try:
     mpmd(plain + ["--treads", "1"], plain, "did you mean --threads?")
     mpmd(plain, ["rnu", "s.toml"], "rank 1", 'did you mean "run"?')
     mpmd(plain, ["run", "other.toml", "-o", "mpmd", "-q"], "rank 1 was given", "other.toml")
+    mpmd(plain, ["--help"], "rank 1 was given", "--help")
+    mpmd(["check", "s.toml"], plain, "rank 1 was given")
     check(not os.path.exists(work + "/mpmd"), "ranks that disagree write nothing")
     done = subprocess.run(["mpirun", "-n", "1", program, *plain, "--threads", "1", ":", "-n", "1", program, *plain, "--threads", "2"], capture_output=True, text=True,
                           timeout=60, cwd=work)
