@@ -1,4 +1,5 @@
 #include "io/rows.hpp"
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <fcntl.h>
@@ -25,7 +26,14 @@ Kept up_to(const std::string& all, const std::string& names, double time, const 
     for (auto line = kept.bytes; line < all.size();) {
         const auto end = all.find('\n', line);
         double t;
-        if (end == std::string::npos) break;
+        if (end == std::string::npos) {
+            // Of a whole row an editor may have taken the line's end; rows up to the checkpoint's time were on the disk before it.
+            const auto cells = [](std::string_view row) { return std::count(row.begin(), row.end(), ','); };
+            const std::string_view row = std::string_view(all).substr(line);
+            const bool number = std::from_chars(row.data(), row.data() + row.size(), t).ec == std::errc{};
+            if (number && t <= time && cells(row) == cells(names)) kept = {all.size(), t};
+            break;
+        }
         if (std::from_chars(all.data() + line, all.data() + end, t).ec != std::errc{})
             throw IoFailed(fmt::format("{}: a row does not begin with a time: '{}': repair or move the file away", file.string(),
                                        all.substr(line, std::min<std::size_t>(end - line, 60))));
@@ -52,6 +60,7 @@ Rows::Rows(const Team& team, const Place& file, std::string names, const std::st
             if (kept.bytes > names.size()) { // else the crash came before the line of units: start anew
                 write = kept.bytes != all.size();
                 all.resize(kept.bytes);
+                if (all.back() != '\n') all += '\n', write = true;
                 start = std::move(all);
             }
         }

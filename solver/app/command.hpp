@@ -35,6 +35,9 @@ std::string other_writer(const io::Checkpoint&);
 /// Collective. Throws BadInput, with the keys that differ, where a checkpoint belongs to another scene.
 void require_same_scene(const Comm&, const io::Checkpoint&, const Scene&);
 
+/// What kuzure check says of a scene. Collective.
+Exit tell_of_run(const Comm&, const SceneArguments&);
+
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
 void add_run(CLI::App&, Action& chosen);
@@ -57,13 +60,21 @@ std::string packages_text();
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package
 /// installed under lib/kuzure. "kuzure" where the system does not say.
 io::Path own_path();
-/// Throws BadInput on all ranks where they were built for different instruction sets: their bits would differ. Collective.
-void require_one_instruction_set(const Comm&);
+/// Throws BadInput on all ranks where they are different programs, or built for different instruction sets: their bits would differ.
+/// Collective.
+void require_one_program(const Comm&);
 
 /// The cores this process may use.
 int cores_here();
 
-/// Use this many threads (0: the cores of this node shared evenly by its ranks); gives the number. Collective.
+/// Nobody's node has more.
+inline constexpr int most_threads = 4096;
+
+/// Use this many threads (0: OMP_NUM_THREADS, or the cores of this node shared evenly by its ranks); gives the number. Collective. Throws
+/// BadInput for what no machine has.
 int use_threads(const Comm&, int threads);
+
+/// What there is to say of more threads than cores: of this rank's own or of its node's; empty where there is nothing. Collective.
+std::string too_many_threads(const Comm&, int threads);
 
 } // namespace kuzure

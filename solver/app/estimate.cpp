@@ -3,6 +3,7 @@
 #include "io/snapshot.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/nearby.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -32,14 +33,17 @@ double neighbours_at_start(const Scene& s, const scene::Filling& f)
         if (s.space.periodic[2]) x.z = wrap(x.z, s.space.low->z, s.space.high->z);
         return x;
     };
+    const auto bodies = scene::nearby(s.bodies, s.dimensions), walls = scene::nearby(s.walls, s.dimensions);
+    const auto holds = [&](const auto& parts, Vector x) {
+        return [&parts, &s, x](std::size_t k) { return scene::contains(parts[k].shape, x, s.dimensions); };
+    };
     std::int64_t pairs = 0;
 #pragma omp parallel for reduction(+ : pairs) schedule(static)
     for (std::int64_t k = 0; k < samples; ++k) {
         const Vector at = f.soil_position(k * all / samples);
         for (const Vector& o : offsets) {
             const Vector x = wrapped(at + o);
-            const auto holds = [&](const auto& part) { return scene::contains(part.shape, x, s.dimensions); };
-            pairs += std::any_of(s.bodies.begin(), s.bodies.end(), holds) || std::any_of(s.walls.begin(), s.walls.end(), holds);
+            pairs += bodies.any(x, holds(s.bodies, x)) || walls.any(x, holds(s.walls, x));
         }
     }
     return samples > 0 ? double(pairs) / double(samples) : 0;

@@ -24,16 +24,23 @@ std::string duration(double seconds)
     return fmt::format("{} d {} h", s / 86400, s % 86400 / 3600);
 }
 
-/// mpirun's ranks always write to a pseudo-terminal; who sends that into a file says TERM=dumb.
-bool terminal()
+/// A terminal that somebody looks at; TERM=dumb says that it cannot move its cursor.
+bool own_terminal()
 {
     const char* kind = std::getenv("TERM");
-    return isatty(STDOUT_FILENO) != 0 && kind && std::string_view(kind) != "dumb";
+    return isatty(STDOUT_FILENO) != 0 && kind && std::string_view(kind) != "dumb" && !launched();
 }
 } // namespace
 
-StatusLine::StatusLine(bool speaks, double end, double begin, std::int64_t step)
-    : speaks_(speaks), bar_(terminal()), end_(end), start_(now()), last_(start_), time_(begin), step_(step)
+const std::vector<std::string>& progress_names()
+{
+    static const std::vector<std::string> names{"auto", "bar", "plain", "none"};
+    return names;
+}
+
+StatusLine::StatusLine(bool speaks, Progress how, double end, double begin, std::int64_t step)
+    : speaks_(speaks && how != Progress::None), bar_(how == Progress::Bar || (how == Progress::Auto && own_terminal())), end_(end),
+      start_(now()), last_(start_), time_(begin), step_(step)
 {
 }
 
@@ -61,6 +68,7 @@ std::string StatusLine::text(const Status& s, double end, double rate, double le
         out += " m";
     }
     out += fmt::format("  max {:.2f} m/s", s.max_speed);
+    if (s.heap && s.heap->off_ground > 0) out += fmt::format("  off the ground {:.2g} %", 100 * s.heap->off_ground);
     if (s.ranks > 1) out += fmt::format("  balance {:.2f}", s.imbalance);
     return out;
 }

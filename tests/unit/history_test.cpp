@@ -56,6 +56,22 @@ TEST_F(HistoryTest, HasHeaderUnitsAndRowsThatReadBack)
                                    "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n");
 }
 
+TEST_F(HistoryTest, ARowWhoseLineEndIsGoneIsKeptWhereItIsWhole)
+{
+    {
+        io::History h(alone, file, 3);
+        for (int k = 0; k < 3; ++k) h.append(row(k));
+    }
+    const std::string whole = io::read_text(file);
+    for (const bool torn : {false, true}) {
+        std::ofstream(file, std::ios::trunc) << whole.substr(0, whole.size() - (torn ? 6 : 1)); // "-0.5" and its comma, or the line's end
+        io::History h(alone, file, 3, row(2).time);
+        EXPECT_EQ(*h.last_time(), row(torn ? 1 : 2).time);
+        if (torn) h.append(row(2));
+        EXPECT_EQ(io::read_text(file), whole);
+    }
+}
+
 TEST_F(HistoryTest, ARestartLeavesNeitherGapNorDouble)
 {
     std::string whole;
