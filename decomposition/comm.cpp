@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <climits>
 #include <cstdio>
+#include <cstdlib>
 
 namespace kuzure {
 
@@ -51,6 +52,29 @@ struct Layout {
 
 } // namespace
 
+Launched launched()
+{
+    const auto number = [](const char* name, int otherwise) {
+        const char* text = std::getenv(name);
+        return text && *text ? std::atoi(text) : otherwise;
+    };
+    // Rank and size as each launcher calls them; Slurm's, beside PMI's, only tell of its own ranks: a shell in a job has them too.
+    constexpr std::pair<const char*, const char*> launchers[] = {{"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"}, // Open MPI
+                                                                 {"PMI_RANK", "PMI_SIZE"}, // MPICH, Intel MPI, srun --mpi=pmi2
+                                                                 {"MV2_COMM_WORLD_RANK", "MV2_COMM_WORLD_SIZE"}, // MVAPICH
+                                                                 {"PMIX_RANK", "SLURM_STEP_NUM_TASKS"}, // srun --mpi=pmix, Fujitsu MPI
+                                                                 {"PALS_RANKID", "PALS_SIZE"},          // Cray
+                                                                 {"JSM_NAMESPACE_RANK", "JSM_NAMESPACE_SIZE"}}; // Spectrum MPI
+    Launched found;
+    for (const auto& [rank, size] : launchers)
+        if (!found && std::getenv(rank)) found = {number(rank, 0), std::max(number(size, -1), -1)};
+    if (found.size == 0 && number("SLURM_STEP_NUM_TASKS", 1) > 1) found = {number("SLURM_PROCID", 0), number("SLURM_STEP_NUM_TASKS", -1)};
+    const int asked = number("KUZURE_MPI", -1);
+    if (asked == 0) return {};
+    if (asked > 0 && !found) return {number("SLURM_PROCID", 0), -1};
+    return found;
+}
+
 // ---- start and end
 // -------------------------------------------------------------------------------------------------
 Environment::Environment(int& argc, char**& argv)
@@ -67,20 +91,31 @@ Environment::Environment(int& argc, char**& argv)
     the_world().reset(new Comm(std::move(handle)));
 }
 
+Environment::Environment()
+{
+    ensure(!the_world(), "two environments in one program");
+    the_world().reset(new Comm(nullptr));
+}
+
 Environment::~Environment()
 {
+    const bool with_mpi = the_world()->handle_ != nullptr;
     the_world().reset();
-    MPI_Finalize();
+    if (with_mpi) MPI_Finalize();
 }
 
 Comm::Comm(std::unique_ptr<Handle> handle) : handle_(std::move(handle))
 {
+    if (!handle_) return;
     check(MPI_Comm_set_errhandler(handle_->comm, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
     check(MPI_Comm_rank(handle_->comm, &rank_), "MPI_Comm_rank");
     check(MPI_Comm_size(handle_->comm, &size_), "MPI_Comm_size");
 }
 
-Comm::~Comm() { MPI_Comm_free(&handle_->comm); }
+Comm::~Comm()
+{
+    if (handle_) MPI_Comm_free(&handle_->comm);
+}
 
 std::string Comm::library()
 {
@@ -98,18 +133,22 @@ const Comm& Comm::world()
     return *the_world();
 }
 
-void* Comm::native() const { return &handle_->comm; }
+void* Comm::native() const { return handle_ ? &handle_->comm : nullptr; }
 
 void Comm::abort(int code) const
 {
     std::fflush(nullptr);
+    if (!handle_) std::_Exit(code);
     MPI_Abort(MPI_COMM_WORLD, code);
     std::abort();
 }
 
 // ---- all ranks at once
 // ---------------------------------------------------------------------------------------------
-void Comm::barrier() const { check(MPI_Barrier(handle_->comm), "MPI_Barrier"); }
+void Comm::barrier() const
+{
+    if (handle_) check(MPI_Barrier(handle_->comm), "MPI_Barrier");
+}
 
 namespace {
 template <class T> void reduce(std::span<T> v, MPI_Datatype type, MPI_Op op, MPI_Comm comm)
@@ -118,22 +157,42 @@ template <class T> void reduce(std::span<T> v, MPI_Datatype type, MPI_Op op, MPI
 }
 } // namespace
 
-void Comm::min(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_MIN, handle_->comm); }
-void Comm::max(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_MAX, handle_->comm); }
-void Comm::sum(std::span<double> v) const { reduce(v, MPI_DOUBLE, MPI_SUM, handle_->comm); }
-void Comm::min(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_MIN, handle_->comm); }
-void Comm::max(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_MAX, handle_->comm); }
-void Comm::sum(std::span<std::int64_t> v) const { reduce(v, MPI_INT64_T, MPI_SUM, handle_->comm); }
+void Comm::min(std::span<double> v) const
+{
+    if (handle_) reduce(v, MPI_DOUBLE, MPI_MIN, handle_->comm);
+}
+void Comm::max(std::span<double> v) const
+{
+    if (handle_) reduce(v, MPI_DOUBLE, MPI_MAX, handle_->comm);
+}
+void Comm::sum(std::span<double> v) const
+{
+    if (handle_) reduce(v, MPI_DOUBLE, MPI_SUM, handle_->comm);
+}
+void Comm::min(std::span<std::int64_t> v) const
+{
+    if (handle_) reduce(v, MPI_INT64_T, MPI_MIN, handle_->comm);
+}
+void Comm::max(std::span<std::int64_t> v) const
+{
+    if (handle_) reduce(v, MPI_INT64_T, MPI_MAX, handle_->comm);
+}
+void Comm::sum(std::span<std::int64_t> v) const
+{
+    if (handle_) reduce(v, MPI_INT64_T, MPI_SUM, handle_->comm);
+}
 
 std::int64_t Comm::sum_below(std::int64_t mine) const
 {
     std::int64_t below = 0;
+    if (!handle_) return below;
     check(MPI_Exscan(&mine, &below, 1, MPI_INT64_T, MPI_SUM, handle_->comm), "MPI_Exscan");
     return rank_ == 0 ? 0 : below;
 }
 
 void Comm::broadcast(std::span<std::byte> bytes, int root) const
 {
+    if (!handle_) return;
     for (std::size_t at = 0; at < bytes.size(); at += largest_piece) {
         const std::size_t n = std::min(largest_piece, bytes.size() - at);
         check(MPI_Bcast(bytes.data() + at, int(n), MPI_BYTE, root, handle_->comm), "MPI_Bcast");
@@ -143,6 +202,7 @@ void Comm::broadcast(std::span<std::byte> bytes, int root) const
 std::vector<std::vector<std::byte>> Comm::gather(std::span<const std::byte> mine, int root) const
 {
     std::vector<std::vector<std::byte>> all;
+    if (!handle_) return {{mine.begin(), mine.end()}};
     const std::int64_t n = std::int64_t(mine.size());
     std::vector<std::int64_t> sizes(rank_ == root ? std::size_t(size_) : 0);
     // clang-tidy 14 does not know that MPI_INT64_T is std::int64_t.
@@ -169,12 +229,20 @@ std::vector<std::vector<std::byte>> Comm::gather(std::span<const std::byte> mine
 
 void Comm::allgather_bytes(const void* mine, void* all, std::size_t item) const
 {
+    if (!handle_) {
+        std::memcpy(all, mine, item);
+        return;
+    }
     const mpi::Type type = mpi::item_of(item);
     check(MPI_Allgather(mine, 1, type.type, all, 1, type.type, handle_->comm), "MPI_Allgather");
 }
 
 void Comm::allgather_bytes(const void* mine, void* all, std::size_t item, std::span<const std::int64_t> counts) const
 {
+    if (!handle_) {
+        if (counts[0] > 0) std::memcpy(all, mine, std::size_t(counts[0]) * item);
+        return;
+    }
     std::vector<int> count, start;
     std::int64_t total = 0;
     for (const std::int64_t c : counts) {
@@ -207,6 +275,7 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
         sends.emplace_back();
         check(MPI_Issend(m.bytes.data(), layout.count, layout.type, m.rank, tag, handle_->comm, &sends.back()), "MPI_Issend");
     }
+    if (!handle_) return in;
     // Synchronous sends complete when they are received: once all of mine are, I enter the barrier, and once
     // everybody is in it, no message is under way.
     MPI_Request all_done = MPI_REQUEST_NULL;
@@ -240,6 +309,7 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
 std::vector<double> Comm::tell(std::span<const int> peers, double mine) const
 {
     std::vector<double> theirs(peers.size());
+    if (peers.empty()) return theirs;
     std::vector<MPI_Request> requests(2 * peers.size());
     for (std::size_t k = 0; k < peers.size(); ++k) {
         ensure(peers[k] >= 0 && peers[k] < size_ && peers[k] != rank_, "tell: a peer that is no other rank");
@@ -253,6 +323,7 @@ std::vector<double> Comm::tell(std::span<const int> peers, double mine) const
 
 NodePlace Comm::node_place() const
 {
+    if (!handle_) return {.rank = 0, .size = 1, .node = 0, .nodes = 1};
     MPI_Comm shared = MPI_COMM_NULL;
     check(MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &shared), "MPI_Comm_split_type");
     NodePlace place{};

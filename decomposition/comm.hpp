@@ -1,5 +1,5 @@
 #pragma once
-// The ranks of a run over MPI. No MPI type is visible here; every MPI return code becomes an exception
+// The ranks of a run, over MPI or one alone without it. No MPI type is visible here; every MPI return code becomes an exception
 // (MpiFailed). All calls belong to the main thread (MPI_THREAD_FUNNELED).
 #include "solver/core/ensure.hpp"
 #include "solver/core/team.hpp"
@@ -15,12 +15,23 @@ struct MpiFailed : std::runtime_error {
     using runtime_error::runtime_error;
 };
 
-/// MPI from construction to destruction, with Comm::world() in between. One per program; throws MpiFailed
-/// where MPI does not start or grants less than MPI_THREAD_FUNNELED. A rank that fails alone must abort():
+/// What the launcher that started this process says of it, without asking MPI. size 0: there was no launcher; size -1: it does not say.
+struct Launched {
+    int rank = 0, size = 0;
+    explicit operator bool() const { return size != 0; }
+};
+/// From the environment: mpirun, mpiexec and srun of the usual MPI libraries. KUZURE_MPI=1 says that there is one whatever it sets, 0 that
+/// there is none.
+Launched launched();
+
+/// The ranks from construction to destruction, with Comm::world() in between. One per program. A rank that fails alone must abort():
 /// finalizing waits.
 class Environment {
 public:
+    /// With MPI. Throws MpiFailed where it does not start or grants less than MPI_THREAD_FUNNELED.
     Environment(int& argc, char**& argv);
+    /// Without MPI: this process alone.
+    Environment();
     Environment(const Environment&) = delete;
     ~Environment();
 };
@@ -90,6 +101,7 @@ public:
     std::int64_t sum_below(std::int64_t) const override;
     void broadcast(std::span<std::byte>, int root = 0) const override;
     std::vector<std::vector<std::byte>> gather(std::span<const std::byte>, int root = 0) const override;
+    /// nullptr without MPI.
     void* native() const override;
 
     /// Each rank sends to whom it likes without the receiver knowing: all messages for this rank, by sender,
@@ -136,7 +148,7 @@ private:
     void allgather_bytes(const void* mine, void* all, std::size_t item) const;
     void allgather_bytes(const void* mine, void* all, std::size_t item, std::span<const std::int64_t> counts) const;
 
-    std::unique_ptr<Handle> handle_;
+    std::unique_ptr<Handle> handle_; // none without MPI
     int rank_ = 0, size_ = 1;
     mutable int round_ = 0; // exchanges so far: two in a row use different tags
 };

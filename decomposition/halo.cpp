@@ -69,7 +69,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
     ensure(!row_bytes.empty() && std::ranges::min(row_bytes) > 0, "a halo's rows have at least one byte");
     Impl& m = *impl_;
     const std::size_t longest = std::ranges::max(row_bytes);
-    const MPI_Comm mpi_comm = *static_cast<const MPI_Comm*>(comm.native());
+    const MPI_Comm mpi_comm = comm.native() ? *static_cast<const MPI_Comm*>(comm.native()) : MPI_COMM_NULL; // none without MPI
 
     std::vector<Parcel<std::int64_t>> counts;
     std::int64_t n_in = 0;
@@ -97,7 +97,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
     for (const std::size_t bytes : row_bytes) {
         if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.row_bytes == bytes; })) continue;
         Channel channel{bytes, {}, {}};
-        m.row.push_back(mpi::item_of(bytes));
+        m.row.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
         auto& requests = m.channels.emplace_back();
         Index first = 0;
         for (const auto& c : counts) {
@@ -205,7 +205,7 @@ void Halo::finish()
     Impl& m = *impl_;
     auto& requests = m.channels[current_];
     const int sends = int(requests.size()) - m.n_receives;
-    check(MPI_Waitall(sends, requests.data() + m.n_receives, MPI_STATUSES_IGNORE), "MPI_Waitall");
+    if (sends > 0) check(MPI_Waitall(sends, requests.data() + m.n_receives, MPI_STATUSES_IGNORE), "MPI_Waitall");
     m.in_flight = false;
     ++refreshes_;
 }

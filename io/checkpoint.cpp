@@ -73,6 +73,7 @@ struct FieldEntry {
     std::string checksum;
 };
 struct Manifest {
+    std::string text;
     Checkpoint what;
     std::vector<FieldEntry> fields;
 };
@@ -92,6 +93,7 @@ Manifest read_manifest(const H5Reader& in)
     const std::string text = read_bytes(in, "/manifest");
     if (in.text("/manifest", "checksum") != hex(sum_of_text(text))) in.refuse("damaged: the checksum of /manifest does not fit");
     Manifest m;
+    m.text = text;
     try {
         const json all = json::parse(text);
         if (all.at("format") != format_name) in.refuse("not a checkpoint of kuzure");
@@ -113,7 +115,7 @@ Manifest read_manifest(const H5Reader& in)
 }
 
 /// Reads and checks the rows of this rank, field by field; keeps them in `into` if there is one.
-Checkpoint read_all(const Team& team, const Path& file, Particles* into)
+Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H5Reader> in, Particles* into)
 {
     // Each rank reads for itself: where one finds damage, none may be waiting inside the library.
     const auto guarded = [&](const auto& work) {
@@ -128,11 +130,18 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
         agree(team, complaint);
     };
 
-    std::optional<H5Reader> in;
     Manifest m;
     std::uint64_t first = 0, count = 0;
     guarded([&] {
-        m = read_manifest(in.emplace(file));
+        if (!in) in = std::make_shared<const H5Reader>(file);
+        m = read_manifest(*in);
+    });
+    // Where its owner writes a new one meanwhile, each rank may have opened another.
+    const std::string first_says = team.broadcast(m.text);
+    guarded([&] {
+        if (m.text != first_says) in->refuse("it was replaced by another while it was being opened: start again");
+    });
+    guarded([&] {
         const auto total = std::uint64_t(m.what.particles), ranks = std::uint64_t(team.size()), me = std::uint64_t(team.rank());
         first = total / ranks * me + std::min(me, total % ranks);
         count = total / ranks + (me < total % ranks ? 1 : 0);
@@ -197,6 +206,7 @@ Checkpoint read_all(const Team& team, const Path& file, Particles* into)
         if (into) into->resize(0);
         throw;
     }
+    m.what.opened = std::move(in);
     return m.what;
 }
 
@@ -207,10 +217,11 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
     return std::uint64_t(particles) * bytes_per_particle + (1 << 17); // the rows, and some for the library
 }
 
-Path write_checkpoint(const Team& team, const Path& directory, const Particles& p, const std::string& scene_hash, const std::string& header)
+Place write_checkpoint(const Team& team, const Place& directory, const Particles& p, const std::string& scene_hash,
+                       const std::string& header)
 {
-    Path file = directory / newest_name;
-    const Path previous = directory / previous_name;
+    Place file = directory / newest_name;
+    const Place previous = directory / previous_name;
     try {
         const std::int64_t total = team.sum(std::int64_t(p.size()));
         const auto first = std::uint64_t(team.sum_below(std::int64_t(p.size())));
@@ -237,7 +248,7 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
         out.attribute("/manifest", "checksum", hex(sum_of_text(text)));
         out.finish();
         on_root(team, [&] {
-            if (std::filesystem::exists(file)) move_file(file, previous);
+            if (exists(file)) move_file(file, previous);
             move_file(out.temporary(), file);
             sync(directory);
         });
@@ -245,7 +256,7 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
         std::string good;
         if (team.rank() == 0)
             for (const auto& candidate : {previous, file})
-                if (std::filesystem::exists(candidate)) good = candidate.string();
+                if (exists(candidate)) good = candidate.string();
         good = team.broadcast(good);
         throw CheckpointFailed(good.empty() ? fmt::format("{}. No checkpoint was written before this one", e.what())
                                             : fmt::format("{}. The last good checkpoint is {}", e.what(), good));
@@ -253,30 +264,34 @@ Path write_checkpoint(const Team& team, const Path& directory, const Particles& 
     return file;
 }
 
-Path keep_generation(const Team& team, const Checkpoint& good)
+Place keep_generation(const Team& team, const Checkpoint& good)
 {
-    const Path directory = directory_of(good.file), newest = directory / newest_name;
-    const bool unnamed = good.file.filename() == unnamed_name, older = good.file.filename() == previous_name;
+    const Place directory = directory_of(good.file), newest = directory / newest_name;
+    const bool unnamed = good.file.name() == unnamed_name, older = good.file.name() == previous_name;
     if (unnamed || older)
         on_root(team, [&] {
-            if (std::filesystem::exists(newest)) move_file(newest, directory / "checkpoint.aside.h5");
+            if (exists(newest)) move_file(newest, directory / "checkpoint.aside.h5");
             if (unnamed) move_file(good.file, newest);
             sync(directory);
         });
     return unnamed ? newest : good.file;
 }
 
-Checkpoint read_checkpoint(const Team& team, const Path& file, Particles& into) { return read_all(team, file, &into); }
+Checkpoint read_checkpoint(const Team& team, const Place& file, Particles& into) { return read_all(team, file, {}, &into); }
+void read_checkpoint(const Team& team, const Checkpoint& verified, Particles& into)
+{
+    read_all(team, verified.file, verified.opened, &into);
+}
 
-Checkpoint verify_checkpoint(const Team& team, const Path& file) { return read_all(team, file, nullptr); }
+Checkpoint verify_checkpoint(const Team& team, const Place& file) { return read_all(team, file, {}, nullptr); }
 
-std::optional<Checkpoint> newest_good(const Team& team, const Path& directory, const std::function<void(const std::string&)>& say)
+std::optional<Checkpoint> newest_good(const Team& team, const Place& directory, const std::function<void(const std::string&)>& say)
 {
     std::vector<std::string> passed_over;
     for (const char* name : {newest_name, unnamed_name, previous_name}) {
-        const Path file = directory / name;
-        if (!team.any(team.rank() == 0 && std::filesystem::exists(file))) continue;
-        const bool half_written = file.extension() == ".tmp";
+        const Place file = directory / name;
+        if (!team.any(team.rank() == 0 && exists(file))) continue;
+        const bool half_written = file.path().extension() == ".tmp";
         try {
             Checkpoint good = verify_checkpoint(team, file);
             for (const auto& why : passed_over)

@@ -1,4 +1,5 @@
 #include "io/document.hpp"
+#include "io/quote.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
@@ -12,6 +13,7 @@ namespace {
 
 const std::size_t largest_file = std::size_t(1) << 20;
 const std::size_t most_problems = 20;
+const std::size_t most_parts = 64; // of a key; the library goes through them by calling itself
 
 /// The parts of a path between its dots; they point into it.
 std::vector<std::string_view> split(std::string_view path)
@@ -36,23 +38,6 @@ std::optional<std::size_t> as_index(std::string_view text)
 
 // ---- bytes ----
 
-/// Position of the first byte that is not well-formed UTF-8, or npos.
-std::size_t malformed(std::string_view s)
-{
-    for (std::size_t i = 0; i < s.size();) {
-        const auto byte = [&](std::size_t k) { return k < s.size() ? (unsigned char)(s[k]) : 0u; };
-        const unsigned b = byte(i);
-        const int more = b < 0x80 ? 0 : b >= 0xC2 && b < 0xE0 ? 1 : b >= 0xE0 && b < 0xF0 ? 2 : b >= 0xF0 && b < 0xF5 ? 3 : -1;
-        if (more < 0) return i;
-        for (int k = 1; k <= more; ++k)
-            if ((byte(i + std::size_t(k)) & 0xC0) != 0x80) return i;
-        const unsigned second = byte(i + 1);
-        if ((b == 0xE0 && second < 0xA0) || (b == 0xED && second > 0x9F) || (b == 0xF0 && second < 0x90) || (b == 0xF4 && second > 0x8F))
-            return i;
-        i += std::size_t(more) + 1;
-    }
-    return s.npos;
-}
 std::size_t line_at(std::string_view text, std::size_t position)
 {
     return 1 + std::size_t(std::count(text.begin(), text.begin() + std::ptrdiff_t(std::min(position, text.size())), '\n'));
@@ -68,6 +53,33 @@ template <class Where> void refuse_bad_bytes(std::string_view text, Where where)
         if (const auto at = text.find(bad); at != text.npos)
             throw BadInput(fmt::format("{}: expected text, found the character U+{}; remove it", where(line_at(text, at)),
                                        bad[1] == '\xB9' ? "FE7F" : "FEFD"));
+}
+
+/// Refuses keys of very many parts ("a.a.a..."), before the library takes its own stack for each; strings and comments are passed over.
+template <class Where> void refuse_deep_keys(std::string_view text, Where where)
+{
+    std::size_t dots = 0;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        if (c == '"' || c == '\'') {
+            const std::string_view three = text.substr(i, 3);
+            const bool lines = three == "\"\"\"" || three == "\'\'\'";
+            const std::string_view end = lines ? three : text.substr(i, 1);
+            i += end.size();
+            while (i < text.size() && text.substr(i, end.size()) != end && (lines || text[i] != '\n'))
+                i += c == '"' && text[i] == '\\' ? 2 : 1;
+            i += lines ? 2 : 0;
+        } else if (c == '#') {
+            i = std::min(text.find('\n', i), text.size());
+            dots = 0;
+        } else if (c == '.') {
+            if (++dots >= most_parts)
+                throw BadInput(fmt::format("{}: expected keys of at most {} parts, found one of more; shorten it", where(line_at(text, i)),
+                                           most_parts));
+        } else if (c == '\n' || c == '=' || c == ',' || c == '[' || c == ']' || c == '{' || c == '}') {
+            dots = 0;
+        }
+    }
 }
 
 // ---- what a value must be ----
@@ -121,7 +133,8 @@ std::optional<Mismatch> wrong_choice(const Key& key, const toml::node& node)
     const auto* s = node.as_string();
     if (!s) return Mismatch{described(node), {}};
     if (std::find(key.choices.begin(), key.choices.end(), s->get()) != key.choices.end()) return {};
-    return Mismatch{described(node), fmt::format("did you mean \"{}\"?", nearest(s->get(), key.choices))};
+    const std::string meant = nearest(s->get(), key.choices);
+    return Mismatch{described(node), meant.empty() ? "choose one of these" : fmt::format("did you mean \"{}\"?", meant)};
 }
 std::optional<Mismatch> wrong_choices(const Key& key, const toml::node& node)
 {
@@ -143,6 +156,9 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     const auto unless = [&](bool right) { return right ? std::nullopt : std::optional(Mismatch{described(node), {}}); };
     switch (key.kind) {
     case Kind::Text:
+        if (node.is_string())
+            if (const auto wrong = not_one_line(node.as_string()->get()); !wrong.empty())
+                return Mismatch{wrong.substr(0, wrong.find(';')), wrong.substr(wrong.find(';') + 2)};
         return unless(node.is_string());
     case Kind::Number:
         return wrong_number(key, node);
@@ -175,7 +191,8 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
     case Kind::Texts:
         if (!node.is_array()) return unless(false);
         for (const auto& element : *node.as_array())
-            if (!element.is_string()) return Mismatch{described(element) + " among them", {}};
+            if (!element.is_string() || !not_one_line(element.as_string()->get()).empty())
+                return Mismatch{described(element) + " among them", {}};
         return {};
     case Kind::Tables:
         if (!node.is_array() || (node.as_array()->empty() && key.need == Need::Required)) return unless(false);
@@ -199,7 +216,9 @@ Document::Document(std::string_view text, std::string name, const KeyTable& keys
     if (text.size() > largest_file)
         throw BadInput(fmt::format("{}: expected {} of at most 1 MiB, found {} bytes; is this {} file?", name_, keys_.file(), text.size(),
                                    keys_.file()));
-    refuse_bad_bytes(text, [&](std::size_t line) { return fmt::format("{}:{}", name_, line); });
+    const auto line_of_file = [&](std::size_t line) { return fmt::format("{}:{}", name_, line); };
+    refuse_bad_bytes(text, line_of_file);
+    refuse_deep_keys(text, line_of_file);
     try {
         root = toml::parse(text);
     } catch (const toml::parse_error& e) {
@@ -267,6 +286,8 @@ std::pair<std::string, std::size_t> Document::place_and_line(const std::string& 
 {
     for (auto it = sets_.rbegin(); it != sets_.rend(); ++it)
         if (path == it->first || path.starts_with(it->first + ".")) return {"--set " + it->second, 0};
+    for (const auto& [table, set] : made_)
+        if (path == table) return {"--set " + set, 0};
     const std::size_t line = line_of(path);
     return {fmt::format("{}:{}", name_, line), line};
 }
@@ -275,6 +296,7 @@ void Document::override_with(const std::string& set)
 {
     const auto place = "--set " + set;
     refuse_bad_bytes(set, [&](std::size_t) { return std::string("--set"); });
+    refuse_deep_keys(set, [&](std::size_t) { return std::string("--set"); });
     const auto equals = set.find('=');
     const auto trim = [](std::string s) {
         const char* blank = " \t\r\n";
@@ -307,7 +329,10 @@ void Document::override_with(const std::string& set)
     toml::node* node = &root;
     for (std::size_t k = 0; k + 1 < parts.size(); ++k) {
         if (auto* table = node->as_table()) {
-            if (!table->contains(parts[k])) table->insert(parts[k], toml::table{});
+            if (!table->contains(parts[k])) {
+                table->insert(parts[k], toml::table{});
+                made_.emplace_back(fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")), set);
+            }
             node = table->get(parts[k]);
             // "rough" and "auto" give way to a table that is set key by key.
             const Key* here = keys_.find(fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")));
@@ -328,6 +353,7 @@ void Document::override_with(const std::string& set)
     if (!table)
         throw BadInput(
             fmt::format("{}: expected a key inside a table, found {}, which is none; see the reference of its keys", place, path));
+    if (!table->contains(parts.back())) made_.emplace_back(path, set);
     table->insert_or_assign(parts.back(), *parsed.get("v"));
     sets_.emplace_back(path, set);
 }
@@ -375,15 +401,15 @@ void Document::complain_unknown(const std::string& path, std::string_view leaf, 
     std::vector<std::string> siblings;
     for (const Key* k : keys_.inside(pattern)) siblings.emplace_back(k->leaf());
     // Beyond what is shown, only the count matters.
-    std::string meant = has_enough() ? siblings.front() : nearest(leaf, siblings);
-    if (!has_enough() && edit_distance(meant, leaf.substr(0, 100)) > 0)
-        for (const Key& k : keys_)
-            if (k.leaf() == leaf) {
-                meant = k.path;
-                break;
-            }
-    complain(path, fmt::format("expected a known key, found \"{}\"; did you mean \"{}\"? Known here: {}", leaf, meant,
-                               fmt::join(siblings, ", ")));
+    const std::string meant = has_enough() ? siblings.front() : nearest(leaf, siblings);
+    std::string remedy = meant.empty() ? "." : fmt::format("; did you mean \"{}\"?", meant);
+    if (!has_enough() && (meant.empty() || edit_distance(meant, leaf.substr(0, 100)) > 0)) {
+        const auto same = std::find_if(keys_.begin(), keys_.end(), [&](const Key& k) { return k.leaf() == leaf; });
+        const auto absent = keys_.file() == "a scene" ? not_simulated(leaf) : std::string();
+        if (same != keys_.end()) remedy = fmt::format("; did you mean \"{}\"?", same->path); // in another table
+        else if (!absent.empty()) remedy = ". " + absent;
+    }
+    complain(path, fmt::format("expected a known key, found \"{}\"{} Known here: {}", leaf, remedy, fmt::join(siblings, ", ")));
 }
 
 namespace {
@@ -396,6 +422,26 @@ const toml::node& fallback(const Key& key)
     return *found->second.get("v");
 }
 } // namespace
+
+/// A table [soil.caly] that only a --set speaks of and that lacks what it needs: the name is misspelt. Says so and gives true.
+bool Document::complain_misspelt_name(const toml::node& value, const std::string& path, const std::string& named)
+{
+    const auto by_set = [&](const std::string& name) {
+        return std::any_of(made_.begin(), made_.end(), [&](const auto& made) { return made.first == name; });
+    };
+    if (!value.is_table() || !by_set(named)) return false;
+    const auto& needed = keys_.inside(keys_.pattern_of(named));
+    if (std::all_of(needed.begin(), needed.end(),
+                    [&](const Key* k) { return k->need != Need::Required || value.as_table()->contains(k->leaf()); }))
+        return false; // a whole one
+    std::vector<std::string> names;
+    for (const auto& name : this->names(path))
+        if (!by_set(join(path, name))) names.push_back(name);
+    const std::string name = named.substr(path.size() + 1);
+    complain(named, fmt::format("expected a {} of the file, found none called \"{}\"{} The file has: {}", path, name,
+                                did_you_mean(name, names), names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+    return true;
+}
 
 /// Checks a table against the rows of its pattern and fills in defaults.
 void Document::check_table(toml::table& table, const std::string& path)
@@ -426,6 +472,7 @@ void Document::check_table(toml::table& table, const std::string& path)
         if (key->kind == Kind::Named) {
             for (auto&& [name, value] : *node.as_table()) {
                 const std::string named = join(here, name.str());
+                if (complain_misspelt_name(value, here, named)) continue;
                 const bool plain = name.str().find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") ==
                                    std::string_view::npos;
                 if (!plain || name.str().empty())

@@ -76,7 +76,10 @@ private:
 
     std::string name_;
     const KeyTable& keys_;
-    std::vector<std::pair<std::string, std::string>> sets_;
+    bool complain_misspelt_name(const toml::node&, const std::string& path, const std::string& named);
+
+    std::vector<std::pair<std::string, std::string>> sets_; // path and words of every --set
+    std::vector<std::pair<std::string, std::string>> made_; // the tables that only a --set speaks of, and its words
     std::vector<Problem> problems_;
 };
 

@@ -1,9 +1,9 @@
 #include "io/hdf5.hpp"
+#include "io/hdf5_driver.hpp"
 #include <algorithm>
 #include <cerrno>
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -66,23 +66,6 @@ Complaint last_complaint()
     return c;
 }
 
-/// From here on the library reports to us and not to the terminal. Nor does it clean up when the program ends: where it could
-/// not bring a file to a full disk, it tries again then, and crashes. Every file is closed long before.
-void be_quiet()
-{
-    static const int told = H5dont_atexit(); // before any other call
-    if (told >= 0) H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-}
-
-hid_t access_for_our_files()
-{
-    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    // Formats since 1.8 carry checksums of their metadata. Locks fail on NFS and Lustre without flock.
-    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_LATEST);
-    H5Pset_file_locking(access, false, true);
-    return access;
-}
-
 } // namespace
 
 std::size_t bytes_of(Number n)
@@ -108,7 +91,8 @@ void H5Writer::check(bool ok, const std::string& doing)
                              c.words.empty() ? "" : fmt::format(" (HDF5: {})", c.words));
 }
 
-H5Writer::H5Writer(const Team& team, const Path& file, std::uint64_t bytes) : team_(team), file_(file), temporary_(file.string() + ".tmp")
+H5Writer::H5Writer(const Team& team, const Place& file, std::uint64_t bytes)
+    : team_(team), file_(file), temporary_(file.beside(file.name() + ".tmp"))
 {
     on_root(team, [&] {
         // Better known beforehand than half way through.
@@ -117,20 +101,26 @@ H5Writer::H5Writer(const Team& team, const Path& file, std::uint64_t bytes) : te
             throw IoFailed(fmt::format("{}: the disk is full: {:.1f} MB are needed and {:.1f} MB are free: make room or choose "
                                        "another directory with -o, then go on with --restart",
                                        file.string(), double(bytes) / 1e6, double(free) / 1e6));
-        be_quiet();
-        const Handle access(access_for_our_files(), H5Pclose);
-        id_ = H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-        check(id_ >= 0, "creating the file");
-        if (id_ < 0) throw IoFailed(complaint_);
+        descriptor_ = create_file(temporary_);
+        if (descriptor_ < 0) throw IoFailed(fmt::format("{}: creating the file failed: {}", file.string(), cause(file, errno)));
     });
-    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
-    std::string trouble = descriptor_ >= 0 ? "" : fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
-    // The room is taken beforehand, so that a disk that fills up meanwhile does not meet the library, which does not bear it,
-    // between two of its own writes. File systems that cannot do that go without.
-    if (team.rank() == 0 && descriptor_ >= 0 && bytes > 0 && ::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, off_t(bytes)) != 0 &&
-        errno == ENOSPC)
-        trouble = fmt::format("{}: taking {:.1f} MB failed: {}", file_.string(), double(bytes) / 1e6, cause(file_, ENOSPC));
     try {
+        std::string trouble;
+        if (team.rank() == 0) {
+            // The room is taken beforehand: better a disk that is full now than one that is full in the middle. File systems that cannot
+            // do that go without.
+            if (bytes > 0 && ::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, off_t(bytes)) != 0)
+                if (const int error = errno; error == ENOSPC || error == EDQUOT || error == EFBIG)
+                    trouble = fmt::format("{}: taking {:.1f} MB failed: {}", file_.string(), double(bytes) / 1e6, cause(file_, error));
+            disk_ = std::make_unique<HdfDisk>(descriptor_);
+            const Handle access(disk_->access(), H5Pclose);
+            id_ = H5Fcreate(temporary_.string().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+            check(id_ >= 0, "creating the file");
+            if (trouble.empty()) trouble = complaint_;
+        } else {
+            descriptor_ = open_file(temporary_, O_WRONLY);
+            if (descriptor_ < 0) trouble = fmt::format("{}: opening failed: {}", temporary_.string(), cause(file_, errno));
+        }
         agree(team, trouble);
     } catch (...) {
         close_and_remove();
@@ -142,10 +132,11 @@ H5Writer::~H5Writer() { close_and_remove(); }
 
 void H5Writer::close_and_remove()
 {
-    if (descriptor_ >= 0) ::close(descriptor_);
     if (id_ >= 0) H5Fclose(id_);
-    std::error_code ignored;
-    if (!finished_ && team_.rank() == 0) std::filesystem::remove(temporary_, ignored);
+    id_ = -1;
+    descriptor_.close();
+    if (!finished_ && team_.rank() == 0) ::unlinkat(temporary_.from(), temporary_.relative(), 0);
+    finished_ = true;
 }
 
 void H5Writer::group(const std::string& name)
@@ -208,39 +199,30 @@ void H5Writer::write(const std::string& name, Number number, const void* rows, s
     if (start < 0) agree(team_, complaint_);
     if (!complaint_.empty()) return; // all hear of it in finish()
 
-    const char* from = static_cast<const char*>(rows);
-    std::size_t left = count * row;
-    auto at = off_t(start) + off_t(first) * off_t(row);
-    while (left > 0) {
-        const std::size_t most = std::size_t(1) << 30; // Linux writes at most 2 GiB at a time
-        const auto n = ::pwrite(descriptor_, from, std::min(left, most), at);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) {
-            complaint_ = fmt::format("{}: writing table {} failed: {}", file_.string(), name, cause(file_, n < 0 ? errno : ENOSPC));
-            return;
-        }
-        from += n, left -= std::size_t(n), at += n;
-    }
+    if (const int error = write_all(descriptor_, rows, count * row, start + first * std::int64_t(row)))
+        complaint_ = fmt::format("{}: writing table {} failed: {}", file_.string(), name, cause(file_, error));
 }
 
 void H5Writer::finish()
 {
     if (finished_) return;
-    // Each rank its own writes: on a network file system nobody else can.
-    if (complaint_.empty() && ::fsync(descriptor_) != 0)
-        complaint_ = fmt::format("{}: bringing it to the disk failed: {}", file_.string(), cause(file_, errno));
+    const auto sync_mine = [&] {
+        if (complaint_.empty() && ::fsync(descriptor_) != 0)
+            complaint_ = fmt::format("{}: bringing it to the disk failed: {}", file_.string(), cause(file_, errno));
+    };
+    sync_mine(); // each rank its own writes: on a network file system nobody else can
     agree(team_, complaint_);
     if (team_.rank() == 0) {
-        check(H5Fflush(id_, H5F_SCOPE_GLOBAL) >= 0, "flushing");
         const hid_t id = id_;
         id_ = -1;
         check(H5Fclose(id) >= 0, "closing");
-        // What was taken and not used goes back.
-        struct stat now;
-        check(::fstat(descriptor_, &now) == 0 && ::ftruncate(descriptor_, now.st_size) == 0, "trimming");
+        // HDF5's own structures; room that was taken and not used goes back.
+        if (const int error = complaint_.empty() ? disk_->write_out() : 0)
+            complaint_ = fmt::format("{}: writing its structure failed: {}", file_.string(), cause(file_, error));
+        sync_mine();
     }
     agree(team_, complaint_);
-    on_root(team_, [&] { sync(temporary_); });
+    descriptor_.close();
     finished_ = true;
 }
 
@@ -257,18 +239,20 @@ void H5Writer::publish()
 // -------------------------------------------------------------------------------------------------------
 void H5Reader::refuse(const std::string& why) const { throw IoFailed(fmt::format("{}: {}", file_.string(), why)); }
 
-H5Reader::H5Reader(const Path& file) : file_(file)
+H5Reader::H5Reader(const Place& file) : file_(file)
 {
-    be_quiet();
-    std::error_code error;
-    const auto status = std::filesystem::status(file, error);
-    if (!std::filesystem::exists(status)) refuse("there is no such file");
-    if (!std::filesystem::is_regular_file(status)) refuse("expected a file, found something else");
-    file_bytes_ = std::filesystem::file_size(file, error);
-    if (error) refuse("asking for its size failed: " + error.message());
-    const Handle access(access_for_our_files(), H5Pclose);
-    id_ = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
+    // A pipe would wait for a writer.
+    descriptor_ = open_file(file, O_RDONLY | O_NONBLOCK);
+    if (descriptor_ < 0) refuse(errno == ENOENT ? "there is no such file" : "opening failed: " + cause(file, errno));
+    struct stat info;
+    if (::fstat(descriptor_, &info) != 0) refuse("asking for its size failed: " + cause(file, errno));
+    if (!S_ISREG(info.st_mode)) refuse("expected a file, found something else");
+    file_bytes_ = std::uint64_t(info.st_size);
+    disk_ = std::make_unique<HdfDisk>(descriptor_);
+    const Handle access(disk_->access(), H5Pclose);
+    id_ = H5Fopen(file.string().c_str(), H5F_ACC_RDONLY, access);
     if (id_ < 0) {
+        if (disk_->error()) refuse("reading failed: " + cause(file, disk_->error()));
         const auto c = last_complaint();
         refuse(fmt::format("not a readable HDF5 file: damaged, cut short or of another kind ({} bytes; HDF5: {})", file_bytes_, c.words));
     }
@@ -276,13 +260,19 @@ H5Reader::H5Reader(const Path& file) : file_(file)
 
 H5Reader::~H5Reader()
 {
-    if (id_ >= 0) H5Fclose(id_);
+    // Where HDF5 cannot close a damaged file, it may still ask for it: it gets zeros and no crash.
+    if (id_ >= 0 && H5Fclose(id_) < 0) static_cast<void>(disk_.release());
 }
 
 bool H5Reader::has(const std::string& name) const
 {
     for (auto slash = name.find('/', 1);; slash = name.find('/', slash + 1)) {
-        if (H5Lexists(id_, name.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+        const std::string part = name.substr(0, slash);
+        if (H5Lexists(id_, part.c_str(), H5P_DEFAULT) <= 0) return false;
+        // Links to other names and other files: not ours, and they lead out of the file.
+        H5L_info_t link;
+        if (H5Lget_info(id_, part.c_str(), &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD)
+            refuse(fmt::format("{} is a link to elsewhere, which kuzure neither writes nor follows", part));
         if (slash == std::string::npos) return true;
     }
 }
@@ -353,14 +343,15 @@ void H5Reader::read(const std::string& name, Number number, std::uint64_t first,
         in_memory(H5Screate_simple(rank, size, nullptr), H5Sclose);
     if (H5Sget_simple_extent_ndims(in_file) != rank || H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start, nullptr, size, nullptr) < 0 ||
         H5Dread(data, native(number), in_memory, in_file, H5P_DEFAULT, into) < 0) {
-        const auto c = last_complaint();
-        refuse(fmt::format("table {} cannot be read: damaged (HDF5: {})", name, c.words));
+        if (disk_->error()) refuse(fmt::format("reading table {} failed: {}", name, cause(file_, disk_->error())));
+        refuse(fmt::format("table {} cannot be read: damaged (HDF5: {})", name, last_complaint().words));
     }
 }
 
 double H5Reader::real(const std::string& object, const std::string& attribute) const
 {
     double v = 0;
+    if (!has(object)) refuse(object + " is missing: not a file of this kind, or damaged");
     const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
     if (!space.ok() || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(a, H5T_NATIVE_DOUBLE, &v) < 0)
@@ -371,6 +362,7 @@ double H5Reader::real(const std::string& object, const std::string& attribute) c
 std::int64_t H5Reader::integer(const std::string& object, const std::string& attribute) const
 {
     std::int64_t v = 0;
+    if (!has(object)) refuse(object + " is missing: not a file of this kind, or damaged");
     const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
     if (!space.ok() || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(a, H5T_NATIVE_INT64, &v) < 0)
@@ -380,6 +372,7 @@ std::int64_t H5Reader::integer(const std::string& object, const std::string& att
 
 std::string H5Reader::text(const std::string& object, const std::string& attribute) const
 {
+    if (!has(object)) refuse(object + " is missing: not a file of this kind, or damaged");
     const Handle a(H5Aopen_by_name(id_, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const Handle type(a.ok() ? H5Aget_type(a) : -1, H5Tclose), space(a.ok() ? H5Aget_space(a) : -1, H5Sclose);
     const bool plain = type.ok() && space.ok() && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
@@ -393,6 +386,7 @@ std::string H5Reader::text(const std::string& object, const std::string& attribu
 
 std::string hdf5_library()
 {
+    quiet_hdf5();
     unsigned major = 0, minor = 0, release = 0;
     H5get_libversion(&major, &minor, &release);
     return fmt::format("HDF5 {}.{}.{}", major, minor, release);

@@ -7,6 +7,12 @@
 
 namespace kuzure::io {
 
+class HdfDisk;
+
+/// The HDF5 library reports to us and not to the terminal, and does no clean-up of its own when the program or MPI ends (after a damaged
+/// file it crashes there). To be called before MPI starts.
+void quiet_hdf5();
+
 /// Name and version of the HDF5 library.
 std::string hdf5_library();
 
@@ -18,15 +24,15 @@ template <> inline constexpr Number stored_as<std::int32_t> = Number::Int32;
 template <> inline constexpr Number stored_as<std::uint8_t> = Number::UInt8;
 std::size_t bytes_of(Number);
 
-/// A new HDF5 file, written by all ranks of a team together. Rank 0 lays out the file by the HDF5 library;
-/// then each rank writes its own rows where they belong. Not through MPI-IO: on a full disk Open MPI's loses
-/// data without a word or hangs (tests/mpi/io_test.cpp), while the system's own calls say what failed on the
+/// A new HDF5 file, written by all ranks of a team together. Rank 0 lays out the file by the HDF5 library, which works in memory;
+/// then each rank writes its own rows where they belong, and rank 0 HDF5's structures. Not through MPI-IO: on a full disk Open MPI's
+/// loses data without a word or hangs (tests/mpi/io_test.cpp), while the system's own calls say what failed on the
 /// rank where it did. All calls are collective and in the same order. Failures may be collected; table() and
 /// finish() throw IoFailed, on all ranks.
 class H5Writer {
 public:
     /// Creates `file`.tmp; `bytes` (all ranks together, roughly) are asked of the disk beforehand.
-    H5Writer(const Team&, const Path& file, std::uint64_t bytes);
+    H5Writer(const Team&, const Place& file, std::uint64_t bytes);
     /// Closes; a file that was not finished is removed.
     ~H5Writer();
     H5Writer(const H5Writer&) = delete;
@@ -48,7 +54,7 @@ public:
     void finish();
     /// finish(), then give the file its name.
     void publish();
-    const Path& temporary() const { return temporary_; }
+    const Place& temporary() const { return temporary_; }
 
 private:
     void write(const std::string& name, Number, const void* rows, std::size_t count, int components);
@@ -57,18 +63,20 @@ private:
     void close_and_remove();
 
     const Team& team_;
-    Path file_, temporary_;
-    std::string complaint_; // the first of this rank
-    std::int64_t id_ = -1;  // rank 0: the file as HDF5 has it open
-    int descriptor_ = -1;   // all ranks: the file as the system has it open
+    Place file_, temporary_;
+    std::string complaint_;         // the first of this rank
+    Descriptor descriptor_;         // all ranks: the file as the system has it open
+    std::unique_ptr<HdfDisk> disk_; // rank 0: the file as HDF5 sees it
+    std::int64_t id_ = -1;          // and has it open
     bool finished_ = false;
 };
 
-/// An HDF5 file read by this rank alone. Trusts nothing: a table is looked at before memory is taken for it.
+/// An HDF5 file read by this rank alone; it stays the one that was opened, also where another gets its name. Trusts nothing: a table is
+/// looked at before memory is taken for it, links are not followed.
 /// Not collective; throws IoFailed on this rank only (see agree()).
 class H5Reader {
 public:
-    explicit H5Reader(const Path& file);
+    explicit H5Reader(const Place& file);
     ~H5Reader();
     H5Reader(const H5Reader&) = delete;
     H5Reader& operator=(const H5Reader&) = delete;
@@ -96,14 +104,16 @@ public:
     double real(const std::string& object, const std::string& attribute) const;
     std::int64_t integer(const std::string& object, const std::string& attribute) const;
     std::string text(const std::string& object, const std::string& attribute) const;
-    const Path& file() const { return file_; }
+    const Place& file() const { return file_; }
     [[noreturn]] void refuse(const std::string& why) const;
 
 private:
     void check_rows(const std::string& name, Number, std::uint64_t first, std::uint64_t count, int components) const;
     void read(const std::string& name, Number, std::uint64_t first, std::uint64_t count, int components, void* into) const;
 
-    Path file_;
+    Place file_;
+    Descriptor descriptor_;
+    std::unique_ptr<HdfDisk> disk_;
     std::int64_t id_ = -1;
     std::uint64_t file_bytes_ = 0;
     mutable std::map<std::string, Table> seen_; // tables that were looked at and found in order

@@ -34,13 +34,13 @@ std::string text(const ProgressRow& r)
 
 } // namespace
 
-History::History(const Team& team, const Path& file, int dimensions, std::optional<double> restart_time)
+History::History(const Team& team, const Place& file, int dimensions, std::optional<double> restart_time)
     : Rows(team, file, names, units(dimensions), restart_time)
 {
 }
 void History::append(const HistoryRow& row) { Rows::append(row.time, text(row)); }
 
-ProgressLog::ProgressLog(const Team& team, const Path& file, std::optional<double> restart_time)
+ProgressLog::ProgressLog(const Team& team, const Place& file, std::optional<double> restart_time)
     : Rows(team, file, "time,step,dt,wall,steps_per_second,balance", "# s,1,s,s,1/s,1", restart_time)
 {
 }

@@ -19,7 +19,7 @@ struct HistoryRow {
 class History : public Rows {
 public:
     /// Collective. As Rows.
-    History(const Team&, const Path& file, int dimensions, std::optional<double> restart_time = {});
+    History(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
     /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
     void append(const HistoryRow&);
 };
@@ -38,7 +38,7 @@ struct ProgressRow {
 class ProgressLog : public Rows {
 public:
     /// Collective. As Rows.
-    ProgressLog(const Team&, const Path& file, std::optional<double> restart_time = {});
+    ProgressLog(const Team&, const Place& file, std::optional<double> restart_time = {});
     /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
     void append(const ProgressRow&);
 };

@@ -110,6 +110,16 @@ int edit_distance(std::string_view a, std::string_view b)
     return now[b.size()];
 }
 
+namespace {
+std::string lower(std::string_view s)
+{
+    std::string out(s);
+    for (char& c : out)
+        if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+    return out;
+}
+} // namespace
+
 std::string nearest(std::string_view written, const std::vector<std::string>& known)
 {
     // What others call it is nearer than any word of similar letters.
@@ -120,12 +130,92 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
     for (const auto& [other, ours] : others)
         if (written == other && std::find(known.begin(), known.end(), ours) != known.end()) return std::string(ours);
     // A very long word is near to nothing, and its distances would take long.
-    const auto word = written.substr(0, 100);
+    const auto word = lower(written.substr(0, 100));
     const std::string* best = nullptr;
-    int least = 0;
-    for (const auto& candidate : known)
-        if (const int distance = edit_distance(word, candidate); !best || distance < least) best = &candidate, least = distance;
+    double least = 0;
+    for (const auto& candidate : known) {
+        const std::string other = lower(candidate);
+        double distance = edit_distance(word, other);
+        // A part of a name, such as "friction" or "oakforest", is like it however long the rest.
+        const auto &shorter = word.size() < other.size() ? word : other, &longer = word.size() < other.size() ? other : word;
+        const bool part = shorter.size() >= 4 && longer.find(shorter) != longer.npos;
+        // Two letters of five may be wrong, one of three or four; of one or two none.
+        const double longest = double(longer.size());
+        if (!part && distance > (longest > 2 ? std::max(1.0, 0.4 * longest) : 0.0)) continue;
+        if (part) distance = std::min(distance, 1 + 0.1 * distance);
+        if (!best || distance < least) best = &candidate, least = distance;
+    }
     return best ? *best : "";
+}
+
+std::string did_you_mean(std::string_view written, const std::vector<std::string>& known)
+{
+    const std::string meant = nearest(written, known);
+    return meant.empty() ? "." : fmt::format("; did you mean \"{}\"?", meant);
+}
+
+std::string not_one_line(std::string_view text)
+{
+    const std::size_t longest = 4096;
+    if (text.size() > longest) return fmt::format("one of {} bytes; shorten it to {}", text.size(), longest);
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const auto c = (unsigned char)(text[i]);
+        const bool second_set = c == 0xC2 && i + 1 < text.size() && (unsigned char)(text[i + 1]) < 0xA0; // U+0080 .. U+009F
+        if (c < 0x20 || c == 0x7F || second_set)
+            return fmt::format("one with {}; write it in one line of plain letters",
+                               c == '\n' || c == '\r' ? std::string("a line break")
+                                                      : fmt::format("the control character U+{:04X}",
+                                                                    second_set ? unsigned((unsigned char)(text[i + 1])) : unsigned(c)));
+    }
+    return {};
+}
+
+std::string not_simulated(std::string_view written)
+{
+    // Beginnings of words by which people look for an effect, and what there is.
+    static constexpr std::pair<std::string_view, std::string_view> ideas[] = {
+        {"rain", "Rain and infiltration are not simulated; a water table that stays is (effects.pore_pressure)."},
+        {"infiltration", "Rain and infiltration are not simulated; a water table that stays is (effects.pore_pressure)."},
+        {"precipitation", "Rain and infiltration are not simulated; a water table that stays is (effects.pore_pressure)."},
+        {"seepage", "Flow of water through soil is not simulated; still water below a table is (effects.pore_pressure)."},
+        {"water", "Flowing water is not simulated; still water below a table is (effects.pore_pressure)."},
+        {"groundwater", "Flowing water is not simulated; still water below a table is (effects.pore_pressure)."},
+        {"fluid", "Flowing water is not simulated; still water below a table is (effects.pore_pressure)."},
+        {"flood", "Flowing water is not simulated; still water below a table is (effects.pore_pressure)."},
+        {"permeability", "Pore pressure does not flow or build up here: soil is drained, or undrained by its strength (cohesion alone)."},
+        {"consolidation", "Pore pressure does not flow or build up here: soil is drained, or undrained by its strength (cohesion alone)."},
+        {"liquefaction", "Pore pressure does not flow or build up here; strength that falls with slip is there (soil.NAME.softening)."},
+        {"suction", "Suction of unsaturated soil is not simulated; give the cohesion that it lends the soil."},
+        {"saturation", "Suction of unsaturated soil is not simulated; give the cohesion that it lends the soil."},
+        {"vegetation", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
+        {"root", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
+        {"tree", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
+        {"earthquake", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
+        {"seismic", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
+        {"quake", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
+        {"temperature", "Heat is not simulated: soil keeps its properties."},
+        {"thermal", "Heat is not simulated: soil keeps its properties."},
+        {"heat", "Heat is not simulated: soil keeps its properties."},
+        {"frost", "Frost and snow are not simulated: soil keeps its properties."},
+        {"snow", "Frost and snow are not simulated: soil keeps its properties."},
+        {"ice", "Frost and snow are not simulated: soil keeps its properties."},
+        {"wind", "Air is not simulated: soil moves through nothing."},
+        {"air", "Air is not simulated: soil moves through nothing."},
+        {"structure", "Structures that bend or break are not simulated; a wall that stands still is ([[wall]])."},
+        {"building", "Structures that bend or break are not simulated; a wall that stands still is ([[wall]])."},
+        {"anchor", "Anchors and reinforcement are not simulated; give the cohesion that they lend the soil."},
+        {"geotextile", "Anchors and reinforcement are not simulated; give the cohesion that they lend the soil."},
+        {"reinforcement", "Anchors and reinforcement are not simulated; give the cohesion that they lend the soil."},
+        {"creep", "Slow creep is not simulated: strength depends on slip (softening) and on the rate of shear (rate_friction) only."},
+        {"gpu", "kuzure runs on processors only; threads and ranks are given on the command line."},
+    };
+    const std::string word = lower(written.substr(0, 100));
+    for (const auto& [begin, sentence] : ideas) {
+        // "rain", "rainfall", "rain_rate"; of three letters the whole word or the first of several.
+        if (!word.starts_with(begin)) continue;
+        if (begin.size() > 3 || word.size() == begin.size() || word[begin.size()] == '_') return std::string(sentence);
+    }
+    return {};
 }
 
 } // namespace kuzure::io

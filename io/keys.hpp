@@ -110,7 +110,14 @@ private:
 
 /// Edits (insert, delete, replace, exchange two neighbours) that lead from one word to the other.
 int edit_distance(std::string_view, std::string_view);
-/// The word closest to the one written; empty if there are none.
+/// The word that was probably meant by the one written; empty where none is like it.
 std::string nearest(std::string_view written, const std::vector<std::string>& known);
+/// The end of a message that names a wrong word: `; did you mean "clay"?`, or "." where no known word is like it.
+std::string did_you_mean(std::string_view written, const std::vector<std::string>& known);
+/// Why a text cannot stand in a line of a message, a figure or a script: control characters, or more than 4096 bytes; empty where it can.
+std::string not_one_line(std::string_view);
+/// One sentence for the name of something that soil does elsewhere but not in kuzure ("rain", "vegetation"), with what comes nearest to it;
+/// empty for other words.
+std::string not_simulated(std::string_view written);
 
 } // namespace kuzure::io

@@ -117,9 +117,10 @@ MachineProfile parse_machine_profile(std::string_view text, const std::filesyste
         QueueProfile q{name, d.text(key + ".mode"), int(number_of(*nodes.get(0))), int(number_of(*nodes.get(1))),
                        d.number(key + ".minutes")};
         if (!q.mode.empty() && std::find(modes.begin(), modes.end(), q.mode) == modes.end())
-            d.complain(key + ".mode", fmt::format("expected the name of a mode, found \"{}\"; {}", q.mode,
-                                                  modes.empty() ? fmt::format("write [mode.{}]", q.mode)
-                                                                : fmt::format("did you mean \"{}\"?", nearest(q.mode, modes))));
+            d.complain(key + ".mode",
+                       fmt::format("expected the name of a mode, found \"{}\"{}", q.mode,
+                                   modes.empty() ? fmt::format("; write [mode.{}]", q.mode)
+                                                 : did_you_mean(q.mode, modes) + fmt::format(" Known: {}", fmt::join(modes, ", "))));
         if (q.least_nodes > q.most_nodes)
             d.complain(key + ".nodes", fmt::format("expected [fewest, most], found [{}, {}]; exchange them", q.least_nodes, q.most_nodes));
         m.queues.push_back(std::move(q));
@@ -163,9 +164,9 @@ MachineProfile read_machine_profile(const std::string& name_or_path, const std::
     throw BadInput(known.empty()
                        ? fmt::format("--machine {}: expected a machine profile, found none in {}; give the path of a .toml file",
                                      name_or_path, fmt::join(places, ", "))
-                       : fmt::format("--machine {}: expected a machine profile, found none of this name in {}; did you mean "
-                                     "\"{}\"? Known: {}; or give the path of a .toml file",
-                                     name_or_path, fmt::join(places, ", "), nearest(name_or_path, known), fmt::join(known, ", ")));
+                       : fmt::format("--machine {}: expected a machine profile, found none of this name in {}{} Known: {}; or give the "
+                                     "path of a .toml file",
+                                     name_or_path, fmt::join(places, ", "), did_you_mean(name_or_path, known), fmt::join(known, ", ")));
 }
 
 } // namespace kuzure::io

@@ -18,27 +18,41 @@ std::mutex hdf5;
 
 struct State {
     int number;
-    Path file;
+    Place file;
     double time = -HUGE_VAL; // s; that of a damaged one stays
     bool mine = false, kept = false, damaged = false;
     SoilColor::Soil soil{};
 };
 
-std::vector<State> states_of(const Team& team, const Path& results)
+/// Where the snapshots of a run are; in a held directory held too.
+Place snapshots_of(const Place& results)
 {
+    const Place place = results / "snapshots";
+    return results.held() ? hold(place) : place;
+}
+
+std::vector<State> states_of(const Team& team, const Place& results)
+{
+    Place snapshots;
     std::string found;
     on_root(team, [&] {
         nlohmann::json numbers = nlohmann::json::array();
-        std::error_code error;
-        for (const auto& e : std::filesystem::directory_iterator(results / "snapshots", error))
-            if (const auto n = snapshot_number(e.path())) numbers.push_back(*n);
+        if (const Place there = results / "snapshots"; exists(there))
+            for (const auto& name : names_in(snapshots_of(results)))
+                if (const auto n = snapshot_number(name)) numbers.push_back(*n);
         if (numbers.empty()) throw IoFailed(fmt::format("{}: no snapshot is there: run the scene again", (results / "snapshots").string()));
-        std::sort(numbers.begin(), numbers.end());
         found = numbers.dump();
     });
+    std::string complaint;
+    try {
+        snapshots = snapshots_of(results);
+    } catch (const IoFailed& e) {
+        complaint = e.what();
+    }
+    agree(team, complaint);
     std::vector<State> all;
     for (const auto& n : nlohmann::json::parse(team.broadcast(found)))
-        all.push_back({n.get<int>(), results / "snapshots" / fmt::format("state_{:06d}.hdf", n.get<int>())});
+        all.push_back({n.get<int>(), snapshots / fmt::format("state_{:06d}.hdf", n.get<int>())});
     return all;
 }
 
@@ -68,17 +82,17 @@ int decimals(const std::vector<State>& states)
     return std::isfinite(gap) ? std::clamp(int(std::ceil(-std::log10(gap) - 1e-6)), 2, 9) : 3;
 }
 
-std::vector<Vector> walls_of(const Path& results, const Path& first)
+std::vector<Vector> walls_of(const Place& first)
 {
-    const Path alone = results / "snapshots" / "walls.hdf";
+    const Place alone = first.beside("walls.hdf");
     const std::lock_guard lock(hdf5);
-    if (std::filesystem::exists(alone)) return read_walls(H5Reader(alone));
+    if (exists(alone)) return read_walls(H5Reader(alone));
     return read_walls(H5Reader(first));
 }
 
 } // namespace
 
-Path picture_file(const Path& results, int number) { return results / fmt::format("picture_{:06d}.png", number); }
+Place picture_file(const Place& results, int number) { return results / fmt::format("picture_{:06d}.png", number); }
 
 std::optional<int> picture_number(const Path& file)
 {
@@ -88,14 +102,12 @@ std::optional<int> picture_number(const Path& file)
     return std::stoi(name.substr(8, 6));
 }
 
-void remove_pictures(const Team& team, const Path& results)
+void remove_pictures(const Team& team, const Place& results)
 {
     if (!can_draw()) Canvas(1, 1); // says why and what helps
     on_root(team, [&] {
-        std::vector<Path> old;
-        for (const auto& e : std::filesystem::directory_iterator(results))
-            if (picture_number(e.path())) old.push_back(e.path());
-        for (const auto& p : old) std::filesystem::remove(p);
+        for (const auto& name : names_in(results))
+            if (picture_number(name)) remove_file(results / name);
     });
 }
 
@@ -194,7 +206,7 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
     if (all.all.empty()) all = failed;
 
     const int digits = decimals(states);
-    const Path first_file = states[first].file;
+    const Place first_file = states[first].file;
     if (task.at) {
         std::size_t next = 0;
         double begin = HUGE_VAL, end = -HUGE_VAL;
@@ -215,11 +227,11 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
     std::vector<State*> mine;
     for (auto& s : states) {
         if (s.damaged) continue;
-        drawn.files.push_back(task.file ? task.file(s.number) : picture_file(task.results, s.number));
+        drawn.files.push_back((task.file ? task.file(s.number) : picture_file(task.results, s.number)).path());
         if (s.mine) mine.push_back(&s);
     }
     if (!mine.empty()) try {
-            const auto walls = walls_of(task.results, first_file);
+            const auto walls = walls_of(first_file);
             std::vector<Vector> shown;
             for (const Vector& w : walls)
                 if (in_slice(w)) shown.push_back(w);

@@ -8,24 +8,24 @@
 namespace kuzure::io {
 
 /// DIR/picture_000012.png: the picture of snapshot 12 as [output] picture asks for it.
-Path picture_file(const Path& results, int number);
+Place picture_file(const Place& results, int number);
 /// The number in such a name; nothing for other files, also for pictures that were asked for afterwards.
 std::optional<int> picture_number(const Path& file);
 
 /// Collective. Removes the run's own pictures, to be drawn anew. Throws BadInput, and leaves them, where this program draws none; IoFailed.
-void remove_pictures(const Team&, const Path& results);
+void remove_pictures(const Team&, const Place& results);
 
 struct PictureTask {
-    Path results; // directory of the run
+    Place results; // directory of the run; held: nothing is read or written through links
     std::string color = "displacement";
     scene::View view = scene::View::Oblique; // 2-D: always from the side
     std::array<double, 2> range{};           // of the colours; 0, 0: that of the run
     int dimensions = 3;
     double spacing = 0; // m
     std::string title;
-    std::optional<double> at = {};             // s: only the snapshot next to it; infinite: the last
-    std::function<Path(int number)> file = {}; // where a picture goes; absent: picture_file()
-    bool tolerant = false;                     // a damaged snapshot is left out with a warning; otherwise it is an IoFailed
+    std::optional<double> at = {};              // s: only the snapshot next to it; infinite: the last
+    std::function<Place(int number)> file = {}; // where a picture goes; absent: picture_file()
+    bool tolerant = false;                      // a damaged snapshot is left out with a warning; otherwise it is an IoFailed
 };
 struct Drawn {
     std::vector<Path> files;

@@ -1,4 +1,5 @@
 #include "io/rows.hpp"
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <fcntl.h>
@@ -13,7 +14,7 @@ struct Kept {
     std::size_t bytes;
     std::optional<double> last_time;
 };
-Kept up_to(const std::string& all, const std::string& names, double time, const Path& file)
+Kept up_to(const std::string& all, const std::string& names, double time, const Place& file)
 {
     if (all.compare(0, names.size(), names) != 0)
         throw IoFailed(fmt::format("{}: this is no table of this version of kuzure (its first line differs): move it "
@@ -25,7 +26,14 @@ Kept up_to(const std::string& all, const std::string& names, double time, const 
     for (auto line = kept.bytes; line < all.size();) {
         const auto end = all.find('\n', line);
         double t;
-        if (end == std::string::npos) break;
+        if (end == std::string::npos) {
+            // Of a whole row an editor may have taken the line's end; rows up to the checkpoint's time were on the disk before it.
+            const auto cells = [](std::string_view row) { return std::count(row.begin(), row.end(), ','); };
+            const std::string_view row = std::string_view(all).substr(line);
+            const bool number = std::from_chars(row.data(), row.data() + row.size(), t).ec == std::errc{};
+            if (number && t <= time && cells(row) == cells(names)) kept = {all.size(), t};
+            break;
+        }
         if (std::from_chars(all.data() + line, all.data() + end, t).ec != std::errc{})
             throw IoFailed(fmt::format("{}: a row does not begin with a time: '{}': repair or move the file away", file.string(),
                                        all.substr(line, std::min<std::size_t>(end - line, 60))));
@@ -38,34 +46,30 @@ Kept up_to(const std::string& all, const std::string& names, double time, const 
 
 } // namespace
 
-Rows::Rows(const Team& team, const Path& file, std::string names, const std::string& units, std::optional<double> restart_time)
+Rows::Rows(const Team& team, const Place& file, std::string names, const std::string& units, std::optional<double> restart_time)
     : team_(team), file_(file)
 {
     names += '\n';
     on_root(team, [&] {
         std::string start = names + units + '\n';
         bool write = true;
-        if (restart_time && std::filesystem::exists(file)) {
+        if (restart_time && exists(file)) {
             std::string all = read_text(file);
             const Kept kept = up_to(all, names, *restart_time, file);
             last_time_ = kept.last_time;
             if (kept.bytes > names.size()) { // else the crash came before the line of units: start anew
                 write = kept.bytes != all.size();
                 all.resize(kept.bytes);
+                if (all.back() != '\n') all += '\n', write = true;
                 start = std::move(all);
             }
         }
         if (write) write_atomically(file, start);
-        fd_ = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+        fd_ = open_file(file, O_WRONLY | O_APPEND);
         if (fd_ < 0) throw IoFailed(fmt::format("{}: opening failed: {}", file.string(), cause(file, errno)));
     });
     double t = team.max(last_time_.value_or(-HUGE_VAL));
     if (t != -HUGE_VAL) last_time_ = t;
-}
-
-Rows::~Rows()
-{
-    if (fd_ >= 0) ::close(fd_);
 }
 
 void Rows::append(double time, const std::string& row)

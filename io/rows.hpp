@@ -10,8 +10,7 @@ class Rows {
 public:
     /// Collective. Starts a new file with two lines, names and units; with a restart time, goes on after the last row not later
     /// than it, dropping later and torn rows. Throws IoFailed, also where the file does not begin with these names.
-    Rows(const Team&, const Path& file, std::string names, const std::string& units, std::optional<double> restart_time = {});
-    ~Rows();
+    Rows(const Team&, const Place& file, std::string names, const std::string& units, std::optional<double> restart_time = {});
     Rows(const Rows&) = delete;
     Rows& operator=(const Rows&) = delete;
 
@@ -25,9 +24,9 @@ public:
 
 private:
     const Team& team_;
-    Path file_;
+    Place file_;
     std::optional<double> last_time_;
-    int fd_ = -1; // rank 0 only
+    Descriptor fd_; // rank 0 only
 };
 
 } // namespace kuzure::io

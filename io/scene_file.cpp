@@ -112,8 +112,8 @@ public:
         const auto found = std::find(names.begin(), names.end(), name);
         to = found == names.end() ? 0 : int(found - names.begin());
         if (found == names.end())
-            file_.complain(path, fmt::format("expected the name of a soil, found \"{}\"; did you mean \"{}\"? Or write [soil.{}]", name,
-                                             nearest(name, names), name));
+            file_.complain(path, fmt::format("expected the name of a soil, found \"{}\"{} The soils here: {}. Or write [soil.{}]", name,
+                                             did_you_mean(name, names), fmt::join(names, ", "), name));
     }
     template <class T, class Describe> void alternative(const std::string& path, scene::Shape& shape, const KeyInfo&, Describe describe)
     {

@@ -83,7 +83,7 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
     return row * std::uint64_t(points) + 32768;
 }
 
-void write_snapshot(const Team& team, const Path& file, const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
+void write_snapshot(const Team& team, const Place& file, const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     for (const auto& f : label.fields) {
         const auto known = snapshot_fields();
@@ -176,7 +176,7 @@ void write_snapshot(const Team& team, const Path& file, const Particles& p, cons
     out.publish();
 }
 
-SoilSnapshot read_snapshot(const Path& file)
+SoilSnapshot read_snapshot(const Place& file)
 {
     const H5Reader in(file);
     const std::string top = "/VTKHDF", data = top + "/PointData/";
@@ -211,18 +211,13 @@ Path last_snapshot(const Path& results)
 
 // ---- series
 // ----------------------------------------------------------------------------------------------------------
-Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<double> restart_time) : team_(team), directory_(directory)
+Snapshots::Snapshots(const Team& team, const Place& directory, std::optional<double> restart_time) : team_(team), directory_(directory)
 {
     if (!restart_time) return;
     std::string found; // "name time" lines, from rank 0 to all
     on_root(team, [&] {
-        namespace fs = std::filesystem;
-        std::vector<std::string> names;
-        for (const auto& e : fs::directory_iterator(directory)) {
-            const std::string name = e.path().filename().string();
-            if (snapshot_number(e.path())) names.push_back(name);
-        }
-        std::sort(names.begin(), names.end());
+        std::vector<std::string> names = names_in(directory);
+        std::erase_if(names, [](const std::string& name) { return !snapshot_number(name); });
         // The files are the truth: they know their times also where the series was lost.
         nlohmann::json kept = nlohmann::json::array();
         for (const auto& name : names) {
@@ -232,7 +227,7 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
             } catch (const IoFailed&) {
                 continue; // a damaged picture of the past is no reason not to go on; its number is used again
             }
-            if (time > *restart_time) fs::remove(directory / name);
+            if (time > *restart_time) remove_file(directory / name);
             else kept.push_back({{"name", name}, {"time", time}});
         }
         found = kept.dump();
@@ -243,13 +238,12 @@ Snapshots::Snapshots(const Team& team, const Path& directory, std::optional<doub
     write_series();
 }
 
-Path Snapshots::write(const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
+Place Snapshots::write(const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     const Entry entry{fmt::format("state_{:06}.hdf", next_), label.time};
     if (!walls_there_) {
-        const Path alone = directory_ / "walls.hdf";
-        std::error_code ignored;
-        const bool there = team_.any(team_.rank() == 0 && std::filesystem::exists(alone, ignored));
+        const Place alone = directory_ / "walls.hdf";
+        const bool there = team_.any(team_.rank() == 0 && exists(alone));
         Particles no_soil;
         no_soil.require(field::density);
         if (!there && team_.sum(std::int64_t(walls.size())) > 0)

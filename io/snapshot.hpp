@@ -27,7 +27,7 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
 /// Collective; every rank brings its soil and its walls, or none. Needs the velocity, stress, density and
 /// origin columns where those fields are asked for; a plastic strain nobody carries is written as zero.
 /// Throws BadInput for an unknown field, IoFailed.
-void write_snapshot(const Team&, const Path& file, const Particles&, const WallPoints&, const SnapshotLabel&);
+void write_snapshot(const Team&, const Place& file, const Particles&, const WallPoints&, const SnapshotLabel&);
 
 /// The soil of a snapshot, in the file's order.
 struct SoilSnapshot {
@@ -36,7 +36,7 @@ struct SoilSnapshot {
     std::vector<Stress> stress;                 // Pa; only where the file has it
 };
 /// Reads a snapshot that kuzure wrote, on this rank alone. Throws IoFailed.
-SoilSnapshot read_snapshot(const Path& file);
+SoilSnapshot read_snapshot(const Place& file);
 /// The newest snapshot of a result directory. Throws IoFailed where there is none.
 Path last_snapshot(const Path& results);
 
@@ -49,10 +49,10 @@ class Snapshots {
 public:
     /// Collective; the directory exists. With a restart time the snapshots up to it stay and later ones are
     /// removed; without, counting starts at 0.
-    Snapshots(const Team&, const Path& directory, std::optional<double> restart_time = {});
+    Snapshots(const Team&, const Place& directory, std::optional<double> restart_time = {});
 
     /// Collective. Writes the next snapshot and the series; gives the file's path. Throws IoFailed.
-    Path write(const Particles&, const WallPoints&, const SnapshotLabel&);
+    Place write(const Particles&, const WallPoints&, const SnapshotLabel&);
     /// Time of the last snapshot in the directory, if there is one: a restart must not write it again.
     std::optional<double> last_time() const;
     int count() const { return next_; }
@@ -65,7 +65,7 @@ private:
     void write_series() const;
 
     const Team& team_;
-    Path directory_;
+    Place directory_;
     std::vector<Entry> entries_;
     int next_ = 0;
     bool walls_there_ = false;

@@ -108,9 +108,9 @@ SoilColor::SoilColor(const H5Reader& in, const std::string& name) : name_(name),
                 fmt::format("color {}: {} does not hold what it needs. It can be coloured by {}. Remedy: run with [output] fields "
                             "that include it",
                             name, in.file().string(), list));
-        throw BadInput(fmt::format("color: expected a field of {}, found \"{}\"; did you mean \"{}\"? It can be coloured by {}, and their "
+        throw BadInput(fmt::format("color: expected a field of {}, found \"{}\"{} It can be coloured by {}, and their "
                                    "components such as velocity_x",
-                                   in.file().string(), name, nearest(name, known), list));
+                                   in.file().string(), name, did_you_mean(name, known), list));
     }
     quantity_.title = name;
     std::replace(quantity_.title.begin(), quantity_.title.end(), '_', ' ');

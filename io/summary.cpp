@@ -44,9 +44,9 @@ ordered_json to_json(const Summary& s)
     return all;
 }
 
-void write_summary(const Team& team, const Path& file, const Summary& summary) { write_json(team, file, to_json(summary)); }
+void write_summary(const Team& team, const Place& file, const Summary& summary) { write_json(team, file, to_json(summary)); }
 
-void write_json(const Team& team, const Path& file, const ordered_json& value)
+void write_json(const Team& team, const Place& file, const ordered_json& value)
 {
     // A message may carry bytes that are not UTF-8 (a file name): replaced, never a reason to lose the
     // summary.

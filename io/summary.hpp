@@ -35,9 +35,9 @@ nlohmann::ordered_json effects_json(const std::vector<scene::EffectNote>&);
 nlohmann::ordered_json to_json(const Summary&);
 
 /// Collective: rank 0 writes, atomically. Throws IoFailed on all ranks.
-void write_summary(const Team&, const Path& file, const Summary&);
+void write_summary(const Team&, const Place& file, const Summary&);
 
 /// Collective: rank 0 writes any JSON value, indented, atomically. Throws IoFailed on all ranks.
-void write_json(const Team&, const Path& file, const nlohmann::ordered_json&);
+void write_json(const Team&, const Place& file, const nlohmann::ordered_json&);
 
 } // namespace kuzure::io

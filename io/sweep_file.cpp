@@ -80,7 +80,11 @@ private:
     }
     std::string text(const toml::node& node, const std::string& key) const
     {
-        if (const auto s = node.value<std::string>(); s && node.is_string() && !s->empty()) return *s;
+        if (const auto s = node.value<std::string>(); s && node.is_string() && !s->empty()) {
+            if (const auto wrong = not_one_line(*s); !wrong.empty())
+                refuse(&node, key, fmt::format("expected words of one line, found {}", wrong));
+            return *s;
+        }
         refuse(&node, key, fmt::format("expected words in quotes, found {}; write, for example, \"fast\"", as_toml(node)));
     }
     const toml::table& table(const toml::node& node, const std::string& key) const
@@ -147,7 +151,7 @@ private:
         if (scene_keys().find(path)) return;
         std::vector<std::string> all;
         for (const Key& k : scene_keys()) all.push_back(k.path);
-        refuse(&node, where + path, fmt::format("expected a key of a scene, found \"{}\"; did you mean \"{}\"?", path, nearest(path, all)));
+        refuse(&node, where + path, fmt::format("expected a key of a scene, found \"{}\"{}", path, did_you_mean(path, all)));
     }
     /// The settings with `preset` replaced by what it stands for: every key, so that it holds whatever the scene file says.
     Settings expanded(const Settings& settings, const toml::node& at) const
@@ -169,9 +173,9 @@ private:
                 std::vector<std::string> names;
                 for (const auto& p : all) names.push_back(p.name);
                 for (const auto& [name, unused] : own_presets_) names.push_back(name);
-                refuse(&at, "preset",
-                       fmt::format("expected one of \"{}\", found \"{}\"; did you mean \"{}\"?", fmt::join(names, "\", \""), value,
-                                   nearest(value, names)));
+                refuse(
+                    &at, "preset",
+                    fmt::format("expected one of \"{}\", found \"{}\"{}", fmt::join(names, "\", \""), value, did_you_mean(value, names)));
             }
             out.emplace_back("accuracy.preset", fmt::format("\"{}\"", value));
             out.insert(out.end(), found->settings.begin(), found->settings.end());

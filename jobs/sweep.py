@@ -9,7 +9,7 @@
 Finished points are not run again: call it again after an interruption, or when batch jobs have ended. Leaves in DIR (default
 results/sweeps/NAME): points.csv, report.md, efficiency.svg/png, losses.svg/png, and every run's own directory.
 Exit codes as kuzure's: 0, 2 the sweep is wrong, 3 layouts of the same soil ended with different bits, 4 a run failed."""
-import argparse, csv, difflib, json, math, os, shutil, statistics, subprocess, sys, tomllib
+import argparse, csv, difflib, json, math, os, re, shutil, statistics, subprocess, sys, tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BATCH = {"slurm": "sbatch", "pjsub": "pjsub", "none": "bash"}
@@ -38,6 +38,31 @@ KEYS = {"": ["title", "kind", "repeats", "steps_per_output", "set", "here", "mac
         "quick": ["repeats", "set"], "case": ["series", "scene", "share", "tiles", "set"]}
 
 
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")  # of series: it becomes directories, figures' labels and jobs' names
+
+
+def kinds(check, what):
+    return lambda v: (check(v), what)
+
+
+whole = kinds(lambda v: type(v) is int and 1 <= v <= 10**6, "a whole number from 1 to 1e6")
+text = kinds(lambda v: isinstance(v, str) and v.isprintable(), "a string of one line")
+texts = kinds(lambda v: isinstance(v, list) and all(isinstance(x, str) and x.isprintable() for x in v), "an array of strings of one line")
+wholes = lambda v, n: isinstance(v, list) and all(whole(x)[0] for x in v) and (n is None or len(v) == n)
+table = kinds(lambda v: isinstance(v, dict), "a table")
+# What the value of each key must be.
+VALUES = {"title": text, "kind": text, "scene": text, "set": texts, "repeats": whole, "steps_per_output": whole, "share": whole, "threads": whole,
+          "series": kinds(lambda v: isinstance(v, str) and NAME.fullmatch(v) and len(v) <= 60, "a name of letters, digits and _ . + -, beginning with one of the first two"),
+          "tiles": kinds(lambda v: wholes(v, 2), "two whole numbers from 1"), "nodes": kinds(lambda v: wholes(v, None) and v, "an array of whole numbers from 1"),
+          "layouts": kinds(lambda v: isinstance(v, list) and v and all(wholes(x, 2) for x in v), "an array of [ranks, threads]"),
+          "here": table, "machine": table, "quick": table, "case": kinds(lambda v: isinstance(v, list) and all(isinstance(x, dict) for x in v), "tables [[case]]")}
+
+
+def in_gnuplot(words):
+    """A string of gnuplot in single quotes: in double ones a backtick would run a command."""
+    return "'" + "".join(c if c.isprintable() else " " for c in words).replace("'", "''") + "'"
+
+
 def read_sweep(path):
     try:
         with open(path, "rb") as f:
@@ -48,15 +73,21 @@ def read_sweep(path):
     def check(table, where):
         for key in table:
             if key not in KEYS[where]:
-                near = difflib.get_close_matches(key, KEYS[where], 1, 0) or KEYS[where]
+                near = difflib.get_close_matches(key, KEYS[where], 1)
                 line = next((k for k, text in enumerate(open(path), 1) if text.strip().startswith(key)), 1)
-                raise Wrong(f'{path}:{line}: {key}: expected a known key, found "{key}"; did you mean "{near[0]}"? Known here: {", ".join(KEYS[where])}')
+                meant = f'; did you mean "{near[0]}"?' if near else "."
+                raise Wrong(f'{path}:{line}: {key}: expected a known key, found "{key}"{meant} Known here: {", ".join(KEYS[where])}')
+            good, what = VALUES[key](table[key])
+            if not good:
+                raise Wrong(f"{path}: {where + '.' if where else ''}{key}: expected {what}, found {table[key]!r:.60}")
 
     check(sweep, "")
     for where in ("here", "machine", "quick"):
         check(sweep.get(where, {}), where)
     if sweep.get("kind") not in ("strong", "weak"):
         raise Wrong(f'{path}: kind: expected "strong" or "weak", found {sweep.get("kind")!r}')
+    if "title" not in sweep:
+        raise Wrong(f'{path}: title: expected title = "...", found nothing')
     if not sweep.get("case"):
         raise Wrong(f"{path}: case: expected [[case]] with scene, found nothing")
     for case in sweep["case"]:
@@ -66,6 +97,11 @@ def read_sweep(path):
         case["scene"] = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(path)), case["scene"]))
         if not os.path.exists(case["scene"]):
             raise Wrong(f"{path}: case: scene: found no file {case['scene']}")
+        case.setdefault("series", os.path.splitext(os.path.basename(case["scene"]))[0])
+        if not NAME.fullmatch(case["series"]):
+            raise Wrong(f'{path}: case: series: the name of the scene file, {case["series"]!r}, is no name for directories; give series = "..."')
+        if sweep["kind"] == "weak" and "share" not in case:
+            raise Wrong(f"{path}: case: share: expected the number of ranks of this case, found nothing")
     return sweep
 
 
@@ -87,7 +123,7 @@ def points_of(sweep, args, profile):
         sets = [*sweep.get("set", []), *extra, *case.get("set", [])]
         if "tiles" in case:
             sets += widened(case["scene"], case["tiles"])
-        series = case.get("series", os.path.splitext(os.path.basename(case["scene"]))[0])
+        series = case["series"]
         layouts = []
         if profile:
             node = profile["node"]
@@ -285,7 +321,7 @@ def draw(rows, out):
         best = list({r["cores"]: r for r in mine}.values())  # the line joins the best layouts
         data += block(f"s{k}", mine) + block(f"b{k}", best)
         colour = f"lc rgb '{COLOURS[k % len(COLOURS)]}'"
-        lines.append(f"$b{k} using 1:2 with lines {colour} notitle, $s{k} using 1:2 with points pt 7 {colour} title \"{s}\" noenhanced, "
+        lines.append(f"$b{k} using 1:2 with lines {colour} notitle, $s{k} using 1:2 with points pt 7 {colour} title {in_gnuplot(s)} noenhanced, "
                      f"$s{k} using 1:2:3 with labels offset 0,1 font ',9' notitle")
     lines = ", ".join(lines)
     top = max(1.0, max(r["efficiency"] for r in rows)) + 0.1

@@ -81,7 +81,7 @@ try {
     std::filesystem::create_directories(directory);
     for (int k = 0; k < rounds; ++k) {
         plain.push_back(timed([&] { write_plainly(directory / "plain", raw); }));
-        written.push_back(timed([&] { file = io::write_checkpoint(alone, directory, p, source.scene_hash, source.header); }));
+        written.push_back(timed([&] { file = io::write_checkpoint(alone, directory, p, source.scene_hash, source.header).path(); }));
         read.push_back(timed([&] { io::verify_checkpoint(alone, file); }));
     }
     fmt::print("{} particles of {} bytes, one rank, {} rounds in turn, in {}\n", p.size(), p.bytes_per_particle(), rounds,

@@ -93,24 +93,27 @@ struct Cloud {
     /// What a step of length dt asks of a model; the kick alike.
     StepInput input(double dt)
     {
-        StepInput in{.particles = &particles, .lists = &lists, .soils = soils, .dt = dt, .kick = dt, .energy_unit = 1e-12};
+        StepInput in{.particles = &particles, .lists = &lists, .soils = soils, .dt = dt, .kick = dt, .next = dt, .energy_unit = 1e-12};
         in.forces.gravity = scene.effects.gravity.value_or(Vector{});
-        for (const auto& m : soils) in.evolving = in.evolving || m.evolves();
+        for (const auto& m : soils) in.evolving = in.evolving || m.evolves(), in.remembering = in.remembering || m.remembers > 0;
         return in;
     }
     /// Sorted, with lists for a model, its records and walls; the cloud may not move while the model is used.
     void prepare(PairModel& model, double skin)
     {
-        model.require_fields(particles);
+        const auto coulomb = [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; };
+        model.require_fields(particles, std::ranges::any_of(scene.walls, coulomb));
+        if (std::ranges::any_of(soils, [](const Material& m) { return m.remembers > 0; })) particles.require(field::opened_volume);
         model.start(particles);
         sort();
         build(model.cluster_width(), skin);
         model.make_records(particles, soils, {});
-        model.place_walls(scene.walls, walls);
+        model.place_walls(scene, walls);
     }
-    /// All stages of one step over all clusters.
+    /// One whole step over all clusters.
     PassResult step(PairModel& model, const StepInput& in)
     {
+        model.move(in);
         std::vector<Index> all(lists.size());
         std::iota(all.begin(), all.end(), 0);
         PassResult result;

@@ -42,7 +42,7 @@ std::string clock_text(const Simulation& sim)
         .dump();
 }
 
-Clock clock_from_text(const std::string& header, const io::Path& file)
+Clock clock_from_text(const std::string& header, const io::Place& file)
 {
     try {
         const auto j = nlohmann::json::parse(header);
@@ -64,6 +64,10 @@ Clock clock_from_text(const std::string& header, const io::Path& file)
         const auto& taken = j.at("largest_taken");
         j.at("largest_energy").get_to(c.largest_energy), taken.at(0).get_to(c.largest_taken.plastic);
         taken.at(1).get_to(c.largest_taken.viscous), taken.at(2).get_to(c.largest_taken.damping);
+        // JSON has no infinities; what a run cannot have is left.
+        if (c.time < 0 || c.dt < 0 || c.step < 0 || c.pairs < 0)
+            throw IoFailed(fmt::format("{}: the clock of this checkpoint is not one that a run can have (t = {:g} s, step {}, dt {:g} s)",
+                                       file.string(), c.time, c.step, c.dt));
         return c;
     } catch (const nlohmann::json::exception& e) {
         throw IoFailed(fmt::format("{}: the clock of this checkpoint cannot be read ({})", file.string(), e.what()));

@@ -8,6 +8,6 @@ namespace kuzure {
 /// Collective: the clock, names of its members as keys.
 std::string clock_text(const Simulation&);
 /// And back. Throws IoFailed, naming the file.
-Clock clock_from_text(const std::string& header, const io::Path& file);
+Clock clock_from_text(const std::string& header, const io::Place& file);
 
 } // namespace kuzure

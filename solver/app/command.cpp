@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <omp.h>
 #include <sched.h>
+#include <unistd.h>
 
 namespace kuzure {
 
@@ -45,10 +46,10 @@ void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scen
 {
     const std::string hash = io::scene_hash(scene);
     if (from.scene_hash == hash) return;
-    const io::Path beside = io::directory_of(from.file) / "scene.toml";
+    const io::Place beside = io::directory_of(from.file) / "scene.toml";
     std::string differs;
     try {
-        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside, {}, scene::StepLimit::Force), scene);
+        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside.path(), {}, scene::StepLimit::Force), scene);
     } catch (const std::runtime_error&) { // not there, or not readable any more: the hashes have to do
     }
     differs = comm.broadcast(differs);
@@ -62,6 +63,15 @@ void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scen
         text += fmt::format("It was written by {}; this is {}, which may know other keys. Remedy: go on with the program that wrote it",
                             writer, version_text());
     throw BadInput(text);
+}
+
+void complain(const std::string& text) noexcept
+{
+    try {
+        const std::string line = "kuzure: " + text + "\n"; // one write: lines of several processes stay whole
+        std::fwrite(line.data(), 1, line.size(), stderr);  // not by fmt, which throws
+    } catch (const std::bad_alloc&) {
+    }
 }
 
 std::string packages_text() { return fmt::format("{}, {}, {}", Comm::library(), io::hdf5_library(), partitioner_library()); }
@@ -82,14 +92,17 @@ io::Path own_path()
                                                                                                                                : self;
 }
 
-void require_one_instruction_set(const Comm& comm)
+void require_one_program(const Comm& comm)
 {
-    const std::string mine = instruction_set(), first = comm.broadcast(mine);
-    const auto different = comm.max(std::int64_t(mine != first));
-    if (different)
+    const std::string mine = version_text(), first = comm.broadcast(mine);
+    if (!comm.any(mine != first)) return;
+    const std::string isa = instruction_set(), first_isa = comm.broadcast(isa);
+    if (comm.any(isa != first_isa))
         throw BadInput(fmt::format("the ranks run kuzure for different instruction sets, {} on rank 0: expected one, so that all ranks "
                                    "give the same bits. Remedy: KUZURE_ISA=x86-64-v3 (or x86-64) on all nodes",
-                                   first));
+                                   first_isa));
+    throw BadInput(
+        fmt::format("the ranks run different programs, {} on rank 0: expected one on all. Remedy: the same kuzure on every node", first));
 }
 
 int cores_here()
@@ -100,12 +113,31 @@ int cores_here()
 
 int use_threads(const Comm& comm, int threads)
 {
-    if (threads <= 0) {
-        const char* asked = std::getenv("OMP_NUM_THREADS");
-        threads = asked && std::atoi(asked) > 0 ? std::atoi(asked) : std::max(1, cores_here() / comm.node_place().size);
-    }
+    const int on_node = comm.node_place().size; // on all ranks, whatever each was told
+    const char* asked = threads > 0 ? nullptr : std::getenv("OMP_NUM_THREADS");
+    const long wanted = asked ? std::strtol(asked, nullptr, 10) : 0;
+    if (comm.any(wanted > most_threads))
+        throw BadInput(fmt::format("OMP_NUM_THREADS: expected at most {} threads for each rank, found more; unset it, or give --threads",
+                                   most_threads));
+    if (threads <= 0) threads = wanted > 0 ? int(wanted) : std::max(1, cores_here() / on_node);
     omp_set_num_threads(threads);
     return threads;
+}
+
+std::string too_many_threads(const Comm& comm, int threads)
+{
+    const auto place = comm.node_place();
+    const int cores = std::max(1, int(sysconf(_SC_NPROCESSORS_ONLN))), mine = cores_here();
+    std::string why;
+    if (threads > mine)
+        why = fmt::format("{} threads on {} core{} that this rank may use: they wait for each other. Remedy: --threads {}{}", threads, mine,
+                          mine == 1 ? "" : "s", mine, mine < cores ? ", or a launcher that does not bind ranks to fewer" : "");
+    else if (threads * place.size > cores)
+        why = fmt::format("{} ranks of {} thread{} on a node of {} core{}: they wait for each other. Remedy: fewer ranks or --threads {}",
+                          place.size, threads, threads == 1 ? "" : "s", cores, cores == 1 ? "" : "s", std::max(1, cores / place.size));
+    // Ranks may sit on different nodes: the first that has something to say speaks for all.
+    std::int64_t speaker = comm.max(why.empty() ? std::int64_t(-1) : std::int64_t(comm.size() - comm.rank()));
+    return speaker < 0 ? std::string() : comm.broadcast(why, comm.size() - int(speaker));
 }
 
 } // namespace kuzure

@@ -39,7 +39,10 @@ std::string other_writer(const io::Checkpoint&);
 void require_same_scene(const Comm&, const io::Checkpoint&, const Scene&);
 
 /// The pictures that the scene asks for, or those by default where it asks for none, from the results in a directory.
-io::PictureTask picture_task(const Scene&, const io::Path& results);
+io::PictureTask picture_task(const Scene&, const io::Place& results);
+
+/// What kuzure check says of a scene. Collective.
+Exit tell_of_run(const Comm&, const SceneArguments&);
 
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
@@ -53,6 +56,9 @@ void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);
 
+/// A line for whoever runs the program, on standard error. Never throws: where nobody can read it, the work goes on.
+void complain(const std::string& text) noexcept;
+
 /// The program's version, git hash, compiler and instruction set.
 std::string version_text();
 /// The libraries that its answers rest on, and their versions.
@@ -61,13 +67,21 @@ std::string packages_text();
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package
 /// installed under lib/kuzure. "kuzure" where the system does not say.
 io::Path own_path();
-/// Throws BadInput on all ranks where they were built for different instruction sets: their bits would differ. Collective.
-void require_one_instruction_set(const Comm&);
+/// Throws BadInput on all ranks where they are different programs, or built for different instruction sets: their bits would differ.
+/// Collective.
+void require_one_program(const Comm&);
 
 /// The cores this process may use.
 int cores_here();
 
-/// Use this many threads (0: the cores of this node shared evenly by its ranks); gives the number. Collective.
+/// Nobody's node has more.
+inline constexpr int most_threads = 4096;
+
+/// Use this many threads (0: OMP_NUM_THREADS, or the cores of this node shared evenly by its ranks); gives the number. Collective. Throws
+/// BadInput for what no machine has.
 int use_threads(const Comm&, int threads);
+
+/// What there is to say of more threads than cores: of this rank's own or of its node's; empty where there is nothing. Collective.
+std::string too_many_threads(const Comm&, int threads);
 
 } // namespace kuzure

@@ -3,6 +3,7 @@
 #include "io/snapshot.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/nearby.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -32,14 +33,17 @@ double neighbours_at_start(const Scene& s, const scene::Filling& f)
         if (s.space.periodic[2]) x.z = wrap(x.z, s.space.low->z, s.space.high->z);
         return x;
     };
+    const auto bodies = scene::nearby(s.bodies, s.dimensions), walls = scene::nearby(s.walls, s.dimensions);
+    const auto holds = [&](const auto& parts, Vector x) {
+        return [&parts, &s, x](std::size_t k) { return scene::contains(parts[k].shape, x, s.dimensions); };
+    };
     std::int64_t pairs = 0;
 #pragma omp parallel for reduction(+ : pairs) schedule(static)
     for (std::int64_t k = 0; k < samples; ++k) {
         const Vector at = f.soil_position(k * all / samples);
         for (const Vector& o : offsets) {
             const Vector x = wrapped(at + o);
-            const auto holds = [&](const auto& part) { return scene::contains(part.shape, x, s.dimensions); };
-            pairs += std::any_of(s.bodies.begin(), s.bodies.end(), holds) || std::any_of(s.walls.begin(), s.walls.end(), holds);
+            pairs += bodies.any(x, holds(s.bodies, x)) || walls.any(x, holds(s.walls, x));
         }
     }
     return samples > 0 ? double(pairs) / double(samples) : 0;
@@ -68,7 +72,12 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
     const double columns = scene::column_bytes(f) + (s.accuracy.sleep_below > 0 ? 4.0 * double(e.soil) : 0);
-    e.memory = columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.walls);
+    const auto& box = f.soil_bounds();
+    const auto across = [&](double low, double high) { return std::floor((high - low) / (2 * s.space.spacing)) + 1; };
+    e.columns = across(box.low.x, box.high.x) * (s.dimensions == 3 ? across(box.low.y, box.high.y) : 1);
+    e.longest =
+        std::max({box.high.x - box.low.x, s.dimensions == 3 ? box.high.y - box.low.y : 0.0, box.high.z - box.low.z}) / s.space.spacing;
+    e.memory = 12 * e.columns + columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.walls);
     // Outputs come at steps: never more of them than steps.
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };
     e.snapshots = s.output.every ? times(*s.output.every) + 2 : 2;
@@ -113,6 +122,12 @@ std::string does_not_fit(const Comm& comm, const Estimate& e, const io::Path& di
                               "({} with {} of the {} ranks). Remedy: more machines, or a larger space.spacing",
                               e.soil, e.walls, bytes_text(e.memory + bytes_per_process * comm.size()), worst, bytes_text(have), here,
                               comm.size());
+        if (e.columns > most_columns || e.longest > longest_box)
+            why +=
+                fmt::format("{}the bodies lie so far apart that the box around them has {:.3g} columns of two spacings and is {:.3g} "
+                            "spacings long, more than the {:.3g} and {:.3g} that can be. Remedy: bodies nearer to each other, or each in a "
+                            "scene of its own",
+                            why.empty() ? "" : "; ", e.columns, e.longest, most_columns, longest_box);
         const double left = (1 - done) * (e.disk() - 3 * e.checkpoint) + (done > 0 ? 1 : 3) * e.checkpoint;
         const auto free = double(io::free_bytes(directory));
         if (left > free)

@@ -23,6 +23,8 @@ struct Estimate {
     double record;  // bytes of a ghost particle, sent every step
     double support; // radius in which particles see each other, spacings
     bool mixed;     // precision of the pair sums
+    double columns; // of the box around all soil, two spacings wide: one rank may hold them all
+    double longest; // side of that box, spacings
 
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
     double disk() const { return snapshots * snapshot + wall_files + 3 * checkpoint + history; }
@@ -30,6 +32,11 @@ struct Estimate {
 /// Neighbours inside the support of one soil particle, walls included: mean over the scene as filled.
 double neighbours_at_start(const Scene&, const scene::Filling&);
 Estimate estimate(const Scene&, const scene::Filling&, const PairModel&);
+
+/// Columns that a run begins with at most; where soil spreads over more, one rank alone could not hold it, so none begins.
+inline constexpr double most_columns = 5e7;
+/// Spacings over which soil may lie: three of them are a block at least, and blocks have numbers up to 2^20.
+inline constexpr double longest_box = 1e6;
 
 /// Bytes that every process takes before its first particle: MPI, HDF5, the program.
 inline constexpr double bytes_per_process = 60e6;

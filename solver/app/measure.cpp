@@ -12,6 +12,28 @@ struct Column {
     std::int32_t count;
     double top; // m, highest particle centre
 };
+
+/// Share of all soil that is below the lowest wall or beyond the outermost ones.
+double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, std::int64_t soil)
+{
+    if (s.walls.empty()) return 0;
+    const auto x = p[field::position];
+    scene::Box all = scene::bounds(s.walls.front().shape);
+    for (const auto& wall : s.walls) {
+        const auto b = scene::bounds(wall.shape);
+        all.low = {std::min(all.low.x, b.low.x), std::min(all.low.y, b.low.y), std::min(all.low.z, b.low.z)};
+        all.high = {std::max(all.high.x, b.high.x), std::max(all.high.y, b.high.y), std::max(all.high.z, b.high.z)};
+    }
+    // Along a period nothing is beyond anything.
+    const bool along_x = !s.space.periodic[0], along_y = s.dimensions == 3 && !s.space.periodic[1], along_z = !s.space.periodic[2];
+    std::int64_t left = 0;
+    for (Index i = 0; i < p.size(); ++i) {
+        const Vector a = x[i];
+        left += (along_x && (a.x < all.low.x || a.x > all.high.x)) || (along_y && (a.y < all.low.y || a.y > all.high.y)) ||
+                (along_z && a.z < all.low.z);
+    }
+    return double(comm.sum(left)) / double(std::max<std::int64_t>(1, soil));
+}
 } // namespace
 
 Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
@@ -64,9 +86,10 @@ Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const sc
         e[3] = std::max(e[3], -(corner.y + c.y * dx)), e[4] = std::max(e[4], corner.y + (c.y + 1) * dx);
     }
     comm.max(std::span<double>(e));
-    if (e[0] < -1e299) return {};
+    const double off = share_off_ground(comm, p, s, filling.soil_count());
+    if (e[0] < -1e299) return {.off_ground = off};
     if (s.dimensions == 2) e[3] = e[4] = 0;
-    return {e[0], -e[1], e[2], -e[3], e[4]};
+    return {e[0], -e[1], e[2], -e[3], e[4], off};
 }
 
 } // namespace kuzure

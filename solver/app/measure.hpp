@@ -7,10 +7,12 @@
 namespace kuzure {
 
 /// Height and reach of the columns, one spacing wide, whose soil stands at least `grain` high (its volume over its
-/// area); outer edges of those columns, m. All zero where no column does.
+/// area); outer edges of those columns, m. All zero where no column does. off_ground: the share of the soil particles that have left the
+/// ground, below the lowest wall or beyond the outermost ones; 0 without walls.
 struct Heap {
     double height = 0;
     double min_x = 0, max_x = 0, min_y = 0, max_y = 0;
+    double off_ground = 0;
 };
 /// Collective; heights count from the lowest soil at the start.
 Heap measure_heap(const Comm&, const Particles&, const Scene&, const scene::Filling&);

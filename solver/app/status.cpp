@@ -24,16 +24,23 @@ std::string duration(double seconds)
     return fmt::format("{} d {} h", s / 86400, s % 86400 / 3600);
 }
 
-/// mpirun's ranks always write to a pseudo-terminal; who sends that into a file says TERM=dumb.
-bool terminal()
+/// A terminal that somebody looks at; TERM=dumb says that it cannot move its cursor.
+bool own_terminal()
 {
     const char* kind = std::getenv("TERM");
-    return isatty(STDOUT_FILENO) != 0 && kind && std::string_view(kind) != "dumb";
+    return isatty(STDOUT_FILENO) != 0 && kind && std::string_view(kind) != "dumb" && !launched();
 }
 } // namespace
 
-StatusLine::StatusLine(bool speaks, double end, double begin, std::int64_t step)
-    : speaks_(speaks), bar_(terminal()), end_(end), start_(now()), last_(start_), time_(begin), step_(step)
+const std::vector<std::string>& progress_names()
+{
+    static const std::vector<std::string> names{"auto", "bar", "plain", "none"};
+    return names;
+}
+
+StatusLine::StatusLine(bool speaks, Progress how, double end, double begin, std::int64_t step)
+    : speaks_(speaks && how != Progress::None), bar_(how == Progress::Bar || (how == Progress::Auto && own_terminal())), end_(end),
+      start_(now()), last_(start_), time_(begin), step_(step)
 {
 }
 
@@ -61,6 +68,7 @@ std::string StatusLine::text(const Status& s, double end, double rate, double le
         out += " m";
     }
     out += fmt::format("  max {:.2f} m/s", s.max_speed);
+    if (s.heap && s.heap->off_ground > 0) out += fmt::format("  off the ground {:.2g} %", 100 * s.heap->off_ground);
     if (s.ranks > 1) out += fmt::format("  balance {:.2f}", s.imbalance);
     return out;
 }
@@ -76,15 +84,18 @@ void StatusLine::show(const Status& s, bool final)
     last_ = t, time_ = s.time, step_ = s.step;
     const double done = std::clamp(s.time / end_, 0.0, 1.0);
     std::string line = text(s, end_, rate, left);
-    if (!bar_) fmt::print("{:3.0f} %  {}\n", 100 * done, line);
+    // Not by fmt's print, which throws: a run goes on when nobody can read how far it is.
+    if (!bar_) std::fputs(fmt::format("{:3.0f} %  {}\n", 100 * done, line).c_str(), stdout);
     else {
         winsize size{};
         const int columns = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
         const int width = columns >= 140 ? 20 : 10, full = int(done * width);
         // Longer than the terminal is wide, it could not renew itself.
         line = cut(line, std::size_t(std::max(0, columns - width - 4)));
-        fmt::print("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'), line,
-                   final ? "\n" : "");
+        std::fputs(fmt::format("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'),
+                               line, final ? "\n" : "")
+                       .c_str(),
+                   stdout);
         standing_ = !final;
     }
     std::fflush(stdout);
@@ -100,7 +111,7 @@ std::string StatusLine::cut(const std::string& text, std::size_t columns)
 void StatusLine::make_room()
 {
     if (!standing_) return;
-    fmt::print("\r\x1b[K");
+    std::fputs("\r\x1b[K", stdout);
     std::fflush(stdout);
     standing_ = false;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace kuzure {
 
@@ -18,10 +19,16 @@ struct Status {
     double imbalance = 1; // busiest rank over the mean
 };
 
+/// How progress is shown: a bar that renews itself, lines for a log, or not at all. Auto: a bar on a terminal of one's own, lines
+/// elsewhere: in a file, and under mpirun, which gives its ranks a terminal that nobody sees and prints what comes out of it line by line.
+enum class Progress { Auto, Bar, Plain, None };
+/// "auto", "bar", "plain", "none", in this order.
+const std::vector<std::string>& progress_names();
+
 class StatusLine {
 public:
     /// end, begin: simulated times, s; step: that of begin.
-    StatusLine(bool speaks, double end, double begin, std::int64_t step);
+    StatusLine(bool speaks, Progress, double end, double begin, std::int64_t step);
     /// True if something should be shown now. `final`: whatever the clock says.
     bool due(bool final) const;
     void show(const Status&, bool final);

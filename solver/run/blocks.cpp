@@ -247,13 +247,27 @@ BlockSoil::Watched BlockSoil::watched(const Block& b, int mine, const std::funct
 // --------------------------------------------------------------------------------------------
 std::vector<Block> StartSoil::blocks() const
 {
+    // Body by body: what lies between bodies far apart is no block.
     const auto& b = filling_.soil_bounds();
-    const Block lo = space_.block_of(b.low), hi = space_.block_of(b.high);
+    const Block least = space_.block_of(b.low), most = space_.block_of(b.high);
     std::vector<Block> all;
-    Block at;
-    for (at[0] = lo[0]; at[0] <= hi[0]; ++at[0])
-        for (at[1] = lo[1]; at[1] <= hi[1]; ++at[1])
-            for (at[2] = lo[2]; at[2] <= hi[2]; ++at[2]) all.push_back(at);
+    for (const auto& body : scene_.bodies) {
+        const scene::Box box = scene::bounds(body.shape);
+        const auto corner = [&](Vector x) { return space_.block_of({x.x, scene_.dimensions == 3 ? x.y : b.low.y, x.z}); };
+        const auto inside = [&](Vector x) {
+            return Vector{std::clamp(x.x, b.low.x, b.high.x), std::clamp(x.y, b.low.y, b.high.y), std::clamp(x.z, b.low.z, b.high.z)};
+        };
+        Block lo = corner(inside(box.low)), hi = corner(inside(box.high)), at;
+        for (int a = 0; a < 3; ++a) {
+            // Across a period the corners may have changed places.
+            if (lo[a] > hi[a]) lo[a] = least[a], hi[a] = most[a];
+        }
+        for (at[0] = lo[0]; at[0] <= hi[0]; ++at[0])
+            for (at[1] = lo[1]; at[1] <= hi[1]; ++at[1])
+                for (at[2] = lo[2]; at[2] <= hi[2]; ++at[2]) all.push_back(at);
+    }
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
     return all;
 }
 

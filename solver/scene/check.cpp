@@ -2,6 +2,7 @@
 #include "solver/core/field.hpp"
 #include "solver/scene/at_rest.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/nearby.hpp"
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
@@ -576,6 +577,56 @@ void resolve(Scene& scene)
                                                       : "everything in double precision");
 }
 
+namespace {
+
+/// Soil that stands where its floor ends and no wall holds it: what runs over the edge falls without end.
+void check_edges(const Scene& scene, Rules& rules)
+{
+    if (!scene.effects.gravity || !(scene.effects.gravity->z < 0) || scene.walls.empty()) return;
+    const double dx = scene.space.spacing, reach = scene.support();
+    const bool flat = scene.dimensions == 2;
+    const Nearby walls = nearby(scene.walls, scene.dimensions), bodies = nearby(scene.bodies, scene.dimensions);
+    const auto in_wall = [&](Vector x) {
+        return walls.any(x, [&](std::size_t w) { return signed_distance(scene.walls[w].shape, x, scene.dimensions) <= 0; });
+    };
+    const auto in_body = [&](Vector x) {
+        return bodies.any(x, [&](std::size_t k) { return contains(scene.bodies[k].shape, x, scene.dimensions); });
+    };
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        const Box body = bounds(scene.bodies[b].shape);
+        const double floor = body.low.z - 0.5 * dx, foot = body.low.z + 0.5 * dx;
+        std::string sides;
+        for (const int axis : {0, 1})
+            for (const bool high : {false, true}) {
+                if ((axis == 1 && flat) || scene.space.periodic[std::size_t(axis)]) continue;
+                const double low_end = axis == 0 ? body.low.x : body.low.y, high_end = axis == 0 ? body.high.x : body.high.y;
+                const double edge = high ? high_end : low_end, out = high ? 1 : -1;
+                const auto at = [&](double beyond, double along, double z) {
+                    const double x = edge + out * beyond;
+                    return axis == 0 ? Vector{x, body.low.y + along * (body.high.y - body.low.y), z}
+                                     : Vector{body.low.x + along * (body.high.x - body.low.x), x, z};
+                };
+                bool open = false;
+                for (const double along : {0.5, 0.25, 0.75}) {
+                    if (!in_wall(at(-0.5 * dx, along, floor)) || in_wall(at(reach, along, floor))) continue;
+                    bool held = false;
+                    for (double beyond = 0.5 * dx; beyond <= reach && !held; beyond += 0.5 * dx) {
+                        const Vector x = at(beyond, along, foot);
+                        held = in_wall(x) || in_body(x);
+                    }
+                    open = open || !held;
+                }
+                if (open) sides += fmt::format("{}{} {}", sides.empty() ? "" : ", ", high ? "high" : "low", axis == 0 ? "x" : "y");
+            }
+        if (!sides.empty())
+            rules.warning(text("body.{}", b), text("the soil stands at an open edge of its floor (at {}): what runs over it falls without "
+                                                   "end; make the floor wider, or stand a wall there",
+                                                   sides));
+    }
+}
+
+} // namespace
+
 Issues check(const Scene& scene, StepLimit limit)
 {
     Issues issues;
@@ -601,6 +652,7 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
         for (auto& issue : problems) rules.issues.push_back(std::move(issue));
     }
     if (filling) {
+        check_edges(scene, rules);
         for (auto& judgement : judge(scene, *filling))
             if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)

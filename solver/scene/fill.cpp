@@ -1,5 +1,6 @@
 #include "solver/scene/fill.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/scene/nearby.hpp"
 #include <fmt/format.h>
 
 namespace kuzure::scene {
@@ -435,11 +436,14 @@ Filling::Survey Filling::survey(const Scene& scene)
     }
     // One mistake may make every shape overlap every other: nobody reads a million lines, nor waits for them.
     const std::size_t enough = 100;
-    for (std::size_t i = 0; i < pieces.size(); ++i)
-        for (std::size_t j = i + 1; j < pieces.size() && issues.size() < enough; ++j) {
+    std::vector<Box> boxes;
+    for (const auto& p : pieces) boxes.push_back(scene::bounds(*p.shape));
+    const Nearby near(boxes, dimensions);
+    for (std::size_t i = 0; i < pieces.size() && issues.size() < enough; ++i)
+        for (const std::size_t j : near.meeting(boxes[i])) {
             const auto &a = pieces[i], &b = pieces[j];
-            if (!a.lattice || !b.lattice) continue;
-            const double depth = common(scene::bounds(*a.shape), scene::bounds(*b.shape), dimensions);
+            if (j <= i || issues.size() >= enough || !a.lattice || !b.lattice) continue;
+            const double depth = common(boxes[i], boxes[j], dimensions);
             if (depth <= std::max(slack(*a.shape, scene.space.spacing, dimensions), slack(*b.shape, scene.space.spacing, dimensions)))
                 continue;
             const bool boxes = std::holds_alternative<Box>(*a.shape) && std::holds_alternative<Box>(*b.shape);

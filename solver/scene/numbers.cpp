@@ -60,4 +60,18 @@ std::vector<Judgement> judge(const Scene& s, const Filling& f)
     return all;
 }
 
+std::vector<SoilNumbers> soil_numbers(const Scene& s, const Filling& f)
+{
+    const double height = f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing;
+    const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
+    std::vector<SoilNumbers> all;
+    for (const auto& soil : s.soils) {
+        const Material m = Material::from(soil);
+        const double weight = soil.density * g;
+        all.push_back({soil.name, weight, m.sideways_at_rest(weight > 0 ? 0.5 * weight * height : std::numeric_limits<double>::infinity()),
+                       weight > 0 ? soil.cohesion / (weight * height) : 0, m.sound_speed, std::sqrt(m.shear / soil.density)});
+    }
+    return all;
+}
+
 } // namespace kuzure::scene

@@ -12,6 +12,16 @@ struct Judgement {
     std::string doubt; // a warning, or empty
 };
 
+/// What a soil's keys mean for this scene.
+struct SoilNumbers {
+    std::string name;
+    double unit_weight; // N/m^3; 0 without gravity
+    double at_rest;     // K0 under half the height of the soil
+    double stability;   // c/(gamma H), H the height of all soil; 0 without gravity
+    double c_p, c_s;    // m/s, P- and S-wave
+};
+std::vector<SoilNumbers> soil_numbers(const Scene&, const Filling&);
+
 /// Base strain, Mach number, layers, step against the P-wave, slenderness, grain number; those that the scene has.
 std::vector<Judgement> judge(const Scene&, const Filling&);
 

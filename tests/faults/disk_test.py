@@ -33,13 +33,15 @@ with Place("disk") as place:
     # (the run knows beforehand, so it must be told to try)
     disk = place.small_disk("few", 3)
     if disk:
-        often = place.write("often.toml", scene_text(every=0.001, checkpoint=1e-6))
+        often = place.write("often.toml", scene_text(every=0.0004, checkpoint=1e-6))
         place.run(often, "often")
         refused = place.run(often, "few/out", expect=2)
         check("does not fit" in refused.stderr and "--force-size" in refused.stderr and "free" in refused.stderr,
               f"more snapshots than the disk holds are refused beforehand, with the numbers: {refused.stderr.strip()}")
         check(not os.path.exists(place("few/out")), "the refused run wrote nothing")
-        full = place.run(often, "few/out", "--force-size", ranks=2, expect=4)
+        # A checkpoint is larger than a snapshot and would meet the full disk first: after the one of a stop there is none.
+        place.run(often, "few/out", "--force-size", "--max-minutes", "1e-9", ranks=2, expect=5)
+        full = place.run(often, "few/out", "--force-size", "--restart", "--set", "output.checkpoint_minutes=1e6", ranks=2, expect=4)
         check("full" in full.stderr and "state_" in full.stderr, "full during a snapshot: the file and the reason are named")
         check("checkpoint" in full.stderr, "full during a snapshot: the last good checkpoint is named")
         check(os.path.exists(place("few/out/checkpoint.h5")), "full during a snapshot: the checkpoint is there")

@@ -103,9 +103,9 @@ class Place:
               f"{os.path.basename(out)} {' '.join(more)} on {ranks}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}")
         return done
 
-    def start(self, scene, out, *more, ranks=1):
+    def start(self, scene, out, *more, ranks=1, said=None):
         # What is said goes to a file: a pipe that nobody reads would stop the ranks.
-        said = open(self(os.path.basename(out) + ".said"), "w")
+        said = open(self(said or os.path.basename(out) + ".said"), "w")
         return subprocess.Popen(self.command(scene, out, *more, ranks=ranks), stdout=said, stderr=said, env=self.environment,
                                 cwd=self.path, start_new_session=True)
 

@@ -11,7 +11,7 @@ def campaign(kills, seed, kills_a_run=5):
     """A record of what was tried and what came of it."""
     rng = random.Random(seed)
     record = {"seed": seed, "kills": 0, "by_victim": {v: 0 for v in VICTIMS}, "during_a_checkpoint_write": 0, "between_two_renames": 0,
-              "before_the_first_checkpoint": 0, "runs": 0, "runs_with_the_bits_of_the_undisturbed_one": 0, "resumed_from_previous": 0}
+              "before_the_first_checkpoint": 0, "second_starters": {"refused": 0, "took over": 0, "killed too": 0}, "runs": 0, "runs_with_the_bits_of_the_undisturbed_one": 0, "resumed_from_previous": 0}
     with Place("kills") as place:
         # So short an interval that a checkpoint is written at nearly every step.
         scene = place.write("scene.toml", scene_text(end=0.03, checkpoint=1e-6))
@@ -52,7 +52,12 @@ def kill_once(place, scene, out, rng, record):
         time.sleep(rng.uniform(0, 0.6))
         if rng.random() < 0.5:
             wait_for(lambda: process.poll() is not None or os.path.exists(temporary), 5, every=0.0002)
-    everyone = place.processes(out)
+    # A second starter beside it, as by a hand that does not know of the first: refused while the first lives, its heir once it is dead.
+    second = None
+    if rng.random() < 0.5:
+        second = place.start(scene, out, rng.choice(("--restart", "--force")), said=out + ".second")
+        time.sleep(rng.uniform(0, 0.6))
+    everyone = [(pid, is_rank) for pid, is_rank in place.processes(out) if not second or pid != second.pid]
     chosen = [pid for pid, is_rank in everyone if is_rank or victim in ("mpirun", "machine")]
     if victim == "mpirun":
         chosen = [pid for pid, is_rank in everyone if not is_rank] or chosen
@@ -64,6 +69,16 @@ def kill_once(place, scene, out, rng, record):
     except Exception:
         process.kill()
         check(False, f"{out}: mpirun did not end within 30 s of the kill of {victim}")
+    if second:
+        if victim == "machine" and second.poll() is None:
+            kill(second.pid, signal.SIGKILL)
+        code = second.wait(120)
+        with open(place(out + ".second")) as f:
+            words = f.read()
+        kind = {2: "refused", 0: "took over", -signal.SIGKILL: "killed too"}.get(code)
+        if check(kind is not None, f"{out}: the second starter ends with {code}: {words[-300:]}"):
+            record["second_starters"][kind] += 1
+        check(code != 2 or "another run" in words, f"{out}: the second starter is told of the first: {words.strip()[-200:]}")
     place.gone(out)
     with open(place(out + ".said")) as f:
         said = f.read()

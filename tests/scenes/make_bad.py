@@ -47,7 +47,7 @@ def out(line): return [("[output]", "[output]\n" + line)]
 CASES = {
     "coordinates_beyond_rounding": (key("spacing = 0.1", "spacing = 1e-6") + shape("box = { low = [1e8, 0.0, 0.0], high = [100000000.00001, 1e-5, 1e-5] }"), r'body\.0\.box: expected coordinates that tell particles 1e-06 m apart from each other, found such that rounding moves by .* m; move the scene nearer to the origin'),
     # spelling and structure
-    "unknown_top": ([("dimensions = 3", "dimensions = 3\ncolour = 1")], r':4: colour: expected a known key, found "colour"; did you mean'),
+    "unknown_top": ([("dimensions = 3", "dimensions = 3\ncolour = 1")], r':4: colour: expected a known key, found "colour"\. Known here: title, '),
     "misspelt_spacing": ([("spacing = 0.1", "spacing = 0.1\nspaceing = 0.1")], r':6: space\.spaceing: .*did you mean "spacing"'),
     "misspelt_table": ([("[effects]", "[efects]")], r':19: efects: .*did you mean "effects"'),
     "misspelt_nested": ([("[accuracy]", "viscosity = { alfa = 0.1, alpha = 0.1 }\n[accuracy]")], r':21: effects\.viscosity\.alfa: .*"alpha"'),
@@ -114,7 +114,7 @@ CASES = {
     "cone_misspelt": ([("poisson = 0.3", "poisson = 0.3\ncone = \"compresion\"")], r'soil\.sand\.cone: expected one of "compression", .*did you mean "compression"'),
     "kernel_unknown": ([("[accuracy]", "[accuracy]\nkernel = \"wendland c6\"")], r'accuracy\.kernel: .*"wendland c4", found "wendland c6"; did you mean "wendland c[24]"'),
     "precision_unknown": ([("[accuracy]", "[accuracy]\nprecision = \"single\"")], r'accuracy\.precision: expected one of "double", "mixed", found "single"'),
-    "surface_unknown": ([("[effects]", "surface = \"ruff\"\n[effects]")], r'wall\.0\.surface: expected "rough", "smooth" or a table, found "ruff"; did you mean "rough"'),
+    "surface_unknown": ([("[effects]", "surface = \"ruff\"\n[effects]")], r'wall\.0\.surface: expected "rough", "smooth" or a table, found "ruff"; choose one of these'),
     "surface_without_angle": ([("[effects]", "surface = {}\n[effects]")], r'wall\.0\.surface\.friction_angle: expected a number in deg'),
     "field_unknown": ([("[output]", "[output]\nfields = [\"velocity\", \"stres\"]")], r'output\.fields: .*found "stres"; did you mean "stress"'),
     "field_twice": ([("[output]", "[output]\nfields = [\"stress\", \"stress\"]")], r'output\.fields: .*"stress" twice'),

@@ -5,8 +5,11 @@
 set -euo pipefail
 program=$1 defects=$2
 status=0
-run() { KUZURE_TEST_DEFECT=$1 LD_PRELOAD=$defects "$program" reference >/dev/null 2>&1; }
-run none || { echo "without a defect it ends with $?" >&2; status=1; }
+# MPI, whose end the defects replace, is started by `run` alone; a scene that is not there is as good as one.
+run() { KUZURE_MPI=1 KUZURE_TEST_DEFECT=$1 LD_PRELOAD=$defects "$program" run nowhere.toml >/dev/null 2>&1; }
+code=0
+run none || code=$?
+[ $code = 2 ] || { echo "without a defect it ends with $code" >&2; status=1; }
 for defect in division invalid overflow thread; do
     code=0
     run $defect || code=$?

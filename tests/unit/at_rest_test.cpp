@@ -1,5 +1,5 @@
 // Stress "at rest": the soil above a point on generated stacks, against closed forms, and what is told to be no equilibrium.
-#include "solver/app/initial_stress.hpp"
+#include "solver/run/initial_stress.hpp"
 #include "solver/scene/check.hpp"
 #include <algorithm>
 #include <gmock/gmock.h>

@@ -19,6 +19,7 @@ template <int I> Scene scene_of(int dimensions)
     using M = std::tuple_element_t<I, Variants>;
     using K = typename M::Kernel;
     Scene s = bench::dry_sand();
+    s.accuracy.scheme = scene::Scheme::LeapFrog;
     s.dimensions = dimensions;
     s.accuracy.kernel = std::is_same_v<K, CubicSpline>  ? scene::Kernel::CubicSpline
                         : std::is_same_v<K, WendlandC2> ? scene::Kernel::WendlandC2

@@ -56,6 +56,22 @@ TEST_F(HistoryTest, HasHeaderUnitsAndRowsThatReadBack)
                                    "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5\n");
 }
 
+TEST_F(HistoryTest, ARowWhoseLineEndIsGoneIsKeptWhereItIsWhole)
+{
+    {
+        io::History h(alone, file, 3);
+        for (int k = 0; k < 3; ++k) h.append(row(k));
+    }
+    const std::string whole = io::read_text(file);
+    for (const bool torn : {false, true}) {
+        std::ofstream(file, std::ios::trunc) << whole.substr(0, whole.size() - (torn ? 6 : 1)); // "-0.5" and its comma, or the line's end
+        io::History h(alone, file, 3, row(2).time);
+        EXPECT_EQ(*h.last_time(), row(torn ? 1 : 2).time);
+        if (torn) h.append(row(2));
+        EXPECT_EQ(io::read_text(file), whole);
+    }
+}
+
 TEST_F(HistoryTest, ARestartLeavesNeitherGapNorDouble)
 {
     std::string whole;
@@ -121,27 +137,37 @@ TEST_F(HistoryTest, WriteAtomicallyReplacesOrLeaves)
 
 TEST_F(HistoryTest, AResultDirectoryIsNeverOverwritten)
 {
-    using io::Existing, io::ResultDirectory;
+    using io::Existing;
     const auto results = dir / "runs" / "one";
-    EXPECT_TRUE(std::filesystem::is_directory(ResultDirectory(alone, results, Existing::Refuse).snapshots()));
+    const auto moved = [](const io::Path& path, Existing existing) {
+        io::ResultDirectory d(alone, path, existing);
+        d.make(existing);
+        return d.moved_to();
+    };
+    EXPECT_EQ(moved(results, Existing::Refuse), "");
+    EXPECT_TRUE(std::filesystem::is_directory(results / "snapshots"));
     std::ofstream(results / "history.csv") << "old";
     try {
-        ResultDirectory(alone, results, Existing::Refuse);
+        io::ResultDirectory(alone, results, Existing::Refuse);
         FAIL();
     } catch (const BadInput& e) {
         EXPECT_THAT(e.what(), HasSubstr("--restart"));
         EXPECT_THAT(e.what(), HasSubstr("--force"));
     }
-    EXPECT_EQ(ResultDirectory(alone, results, Existing::GoOn).moved_to(), "");
+    // Nothing but results is gone on with or moved aside: a wrong -o may name a home directory.
+    EXPECT_THROW(io::ResultDirectory(alone, results, Existing::GoOn), BadInput);
+    EXPECT_THROW(io::ResultDirectory(alone, results, Existing::MoveAside), BadInput);
+    std::ofstream(results / "scene.toml") << "# kuzure 0.1.0\n";
+    EXPECT_EQ(moved(results, Existing::GoOn), "");
     EXPECT_EQ(io::read_text(results / "history.csv"), "old");
 
-    EXPECT_EQ(ResultDirectory(alone, results.string() + "/", Existing::MoveAside).moved_to(), results.string() + ".old-1");
+    EXPECT_EQ(moved(results.string() + "/", Existing::MoveAside), results.string() + ".old-1");
     EXPECT_EQ(io::read_text(results.string() + ".old-1/history.csv"), "old");
     EXPECT_FALSE(std::filesystem::exists(results / "history.csv"));
-    EXPECT_EQ(ResultDirectory(alone, results, Existing::MoveAside).moved_to(), results.string() + ".old-2");
+    EXPECT_EQ(moved(results, Existing::MoveAside), results.string() + ".old-2");
 
     std::ofstream(dir / "file") << "x";
-    EXPECT_THROW(ResultDirectory(alone, dir / "file", Existing::MoveAside), BadInput);
-    EXPECT_THROW(ResultDirectory(alone, dir / "file" / "below", Existing::Refuse), IoFailed);
+    EXPECT_THROW(moved(dir / "file", Existing::MoveAside), BadInput);
+    EXPECT_THROW(moved(dir / "file" / "below", Existing::Refuse), IoFailed);
     EXPECT_GT(io::free_bytes(dir / "not" / "there"), 0u);
 }

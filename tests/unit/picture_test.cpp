@@ -422,7 +422,7 @@ TEST_F(SeriesTest, ADamagedSnapshotIsNamedOrLeftOut)
     }
     task.tolerant = true;
     const auto drawn = io::draw_pictures(alone, task);
-    EXPECT_THAT(drawn.files, testing::ElementsAre(io::picture_file(dir, 0), io::picture_file(dir, 2)));
+    EXPECT_THAT(drawn.files, testing::ElementsAre(io::picture_file(dir, 0).path(), io::picture_file(dir, 2).path()));
     EXPECT_THAT(drawn.warnings, testing::ElementsAre(HasSubstr("state_000001.hdf")));
     task.results = dir / "nowhere";
     EXPECT_THROW(io::draw_pictures(alone, task), IoFailed);
@@ -439,7 +439,7 @@ TEST_F(SeriesTest, WallsComeFromTheirOwnFileOrFromTheFirstSnapshot)
 
 TEST(PictureNames, AreTheRunsOwnOrNot)
 {
-    EXPECT_EQ(io::picture_number(io::picture_file("a/b", 12)), 12);
+    EXPECT_EQ(io::picture_number(io::picture_file("a/b", 12).path()), 12);
     EXPECT_FALSE(io::picture_number("picture_speed_cut_000012.png"));
     EXPECT_FALSE(io::picture_number("picture_0000012.png"));
 }

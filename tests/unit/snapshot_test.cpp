@@ -128,7 +128,7 @@ TEST_F(SnapshotTest, TheSeriesFollowsARestart)
     EXPECT_EQ(s.last_time(), 0.1);
     EXPECT_FALSE(std::filesystem::exists(dir / "state_000003.hdf"));
     EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1"));
-    EXPECT_EQ(s.write(p, walls, {0.2, 0, 3, "", {"velocity"}}), dir / "state_000002.hdf");
+    EXPECT_EQ(s.write(p, walls, {0.2, 0, 3, "", {"velocity"}}).path(), dir / "state_000002.hdf");
     EXPECT_THAT(series(), ElementsAre("state_000000.hdf 0.0", "state_000001.hdf 0.1", "state_000002.hdf 0.2"));
 }
 

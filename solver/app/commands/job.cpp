@@ -1,4 +1,5 @@
 // kuzure job: a batch script for a machine of jobs/machines, to standard output.
+#include "io/quote.hpp"
 #include "solver/app/command.hpp"
 #include "solver/app/command_line.hpp"
 #include "solver/app/predict.hpp"
@@ -38,13 +39,6 @@ struct Plan {
     bool clocked() const { return limit > 0; }
 };
 
-std::string quoted(const std::string& s)
-{
-    std::string out = "'";
-    for (const char c : s) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return out + "'";
-}
-
 /// A batch system's name for the job: letters, digits, - and _, beginning with a letter.
 std::string job_name(const io::Path& scene)
 {
@@ -81,8 +75,8 @@ template <class Items> BadInput no_such(const char* option, const std::string& n
     std::vector<std::string> names;
     for (const auto& item : items) names.push_back(item.name);
     if (names.empty()) return BadInput(fmt::format("--{} {}: {} has no such thing; leave it out", option, name, m.file.string()));
-    return BadInput(fmt::format("--{0} {1}: expected a {0} of {2}, found none of this name; did you mean \"{3}\"? Known: {4}", option, name,
-                                m.file.string(), io::nearest(name, names), fmt::join(names, ", ")));
+    return BadInput(fmt::format("--{0} {1}: expected a {0} of {2}, found none of this name{3} Known: {4}", option, name, m.file.string(),
+                                io::did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
 void choose_mode_and_queue(Plan& p, const Arguments& a)
@@ -179,9 +173,10 @@ std::string header(const Plan& p, const Arguments& a)
     const char* mark = m.batch == Batch::Pjsub ? "#PJM" : "#SBATCH";
     std::string out = "#!/bin/bash\n";
     const auto option = [&](const std::string& text) { out += fmt::format("{} {}\n", mark, text); };
-    const std::string account = a.account.empty() ? "PROJECT" : a.account;
+    const auto comment = [&](const std::string& text) { out += "# " + io::comment_text(text) + "\n"; };
+    const std::string account = a.account.empty() ? "PROJECT" : io::batch_value(a.account, "--account");
     if (m.batch == Batch::Pjsub) {
-        if (p.queue) option("-L rscgrp=" + p.queue->name);
+        if (p.queue) option("-L rscgrp=" + io::batch_value(p.queue->name, "--queue"));
         option(fmt::format("-L node={}", p.nodes));
         option("-L elapse=" + clock_text(p.limit));
         option(fmt::format("--mpi proc={}", p.ranks));
@@ -190,7 +185,7 @@ std::string header(const Plan& p, const Arguments& a)
         option("-j");
     } else if (m.batch == Batch::Slurm) {
         option("--job-name=" + p.name);
-        if (p.queue && p.queue->name != "default") option("--partition=" + p.queue->name);
+        if (p.queue && p.queue->name != "default") option("--partition=" + io::batch_value(p.queue->name, "--queue"));
         option(fmt::format("--nodes={}", p.nodes));
         option(fmt::format("--ntasks-per-node={}", p.per_node));
         option(fmt::format("--cpus-per-task={}", std::max(1, p.threads / m.node.threads_per_core)));
@@ -203,16 +198,16 @@ std::string header(const Plan& p, const Arguments& a)
         if (line.starts_with("#")) out += line + "\n";
         else option(filled(line, p));
     }
-    out += fmt::format("# {}\n", version_text());
-    out += fmt::format("# {}: {} soil and {} wall particles, {} steps\n", p.scene.filename().string(), e.soil, e.walls, e.steps);
-    out += fmt::format("# {}{}: {} node{} x {} rank{} x {} thread{}, {} of memory on each node\n", m.title,
-                       p.mode ? ", " + p.mode->name + " mode" : "", p.nodes, p.nodes == 1 ? "" : "s", p.per_node,
-                       p.per_node == 1 ? "" : "s", p.threads, p.threads == 1 ? "" : "s", bytes_text(p.memory));
-    out += fmt::format("# predicted: {} ({:.3g} s a step) by the constants of {}\n", duration_text(p.predicted),
-                       p.predicted / double(std::max<std::int64_t>(1, e.steps)), m.file.string());
+    comment(version_text());
+    comment(fmt::format("{}: {} soil and {} wall particles, {} steps", p.scene.filename().string(), e.soil, e.walls, e.steps));
+    comment(fmt::format("{}{}: {} node{} x {} rank{} x {} thread{}, {} of memory on each node", m.title,
+                        p.mode ? ", " + p.mode->name + " mode" : "", p.nodes, p.nodes == 1 ? "" : "s", p.per_node,
+                        p.per_node == 1 ? "" : "s", p.threads, p.threads == 1 ? "" : "s", bytes_text(p.memory)));
+    comment(fmt::format("predicted: {} ({:.3g} s a step) by the constants of {}", duration_text(p.predicted),
+                        p.predicted / double(std::max<std::int64_t>(1, e.steps)), m.file.string()));
     if (p.clocked())
-        out += fmt::format("# {} a job, the last {} kept for the checkpoint: {}\n", duration_text(p.limit), duration_text(p.margin),
-                           p.jobs == 1 ? "one job should do" : fmt::format("about {} jobs", p.jobs));
+        comment(fmt::format("{} a job, the last {} kept for the checkpoint: {}", duration_text(p.limit), duration_text(p.margin),
+                            p.jobs == 1 ? "one job should do" : fmt::format("about {} jobs", p.jobs)));
     return out;
 }
 
@@ -244,9 +239,9 @@ std::string body(const Plan& p, const Arguments& a)
 {
     const auto& m = p.machine;
     std::string out = "set -u\nexport TERM=dumb # plain lines in the log, no bar\n";
-    out += fmt::format("program=${{KUZURE:-{}}}\n", quoted(p.program.string()));
-    out += fmt::format("scene={}\n", quoted(p.scene.string()));
-    out += fmt::format("results={}\n", quoted(p.results.string()));
+    out += fmt::format("program=${{KUZURE:-{}}}\n", io::shell_word(p.program.string()));
+    out += fmt::format("scene={}\n", io::shell_word(p.scene.string()));
+    out += fmt::format("results={}\n", io::shell_word(p.results.string()));
     if (m.batch == Batch::Pjsub && m.resubmit == io::Resubmit::Chain)
         out += fmt::format(R"sh(
 # Compute nodes cannot submit. Started by hand on a login node (bash SCRIPT [JOBS]), this submits a chain of step jobs, of which
@@ -285,9 +280,10 @@ steps() { { sed -n 's/^ *"steps": *\([0-9]*\),*$/\1/p' "$results/summary.json" 2
 before=$(steps)
 )sh";
     std::string launch = filled(m.launcher, p);
+    if (!launch.empty()) out += "export KUZURE_MPI=1 # ranks, whatever the launcher tells them of itself\n";
     if (p.mode && !p.mode->wrapper.empty()) launch += " " + p.mode->wrapper;
     out += fmt::format("{} \"$program\" run \"$scene\" -o \"$results\"", launch);
-    for (const auto& set : a.scene.sets) out += " --set " + quoted(set);
+    for (const auto& set : a.scene.sets) out += " --set " + io::shell_word(set);
     if (a.scene.force_step) out += " --force-step";
     out += fmt::format(" --threads {}", p.threads);
     if (p.clocked()) out += R"sh( --max-minutes "$(printf '%d.%02d' $((left / 60)) $((left % 60 * 100 / 60)))")sh";
@@ -326,11 +322,11 @@ void add_job(CLI::App& app, Action& chosen)
     auto a = std::make_shared<Arguments>();
     a->scene.add_to(*command);
     command->add_option("--machine", a->machine, "a profile of jobs/machines, or the path of one")->required()->type_name("NAME");
-    command->add_option("--nodes", a->nodes, "nodes of a job")->required()->check(CLI::Range(1, 10000000));
+    command->add_option("-n,--nodes", a->nodes, "nodes of a job")->required()->check(CLI::Range(1, 10000000));
     command->add_option("--mode", a->mode, "how the nodes' memory is set up, such as flat or cache")->type_name("NAME");
     command->add_option("--queue", a->queue, "queue (default: the profile's first that fits)")->type_name("NAME");
     command->add_option("--account", a->account, "project that pays")->type_name("NAME");
-    command->add_option("--minutes", a->minutes, "clock limit of a job (default: from the predicted time)")->check(CLI::PositiveNumber);
+    command->add_option("--minutes", a->minutes, "clock limit of a job (default: from the predicted time)")->check(CLI::Range(1.0, 1e6));
     command->add_option("--ranks-per-node", a->ranks_per_node, "ranks on each node (default: the profile's)")->check(CLI::Range(1, 4096));
     command->add_option("-o,--output", a->output, "result directory (default: as kuzure run)")->type_name("DIR");
     under_heading(*command, "What the job asks for",
@@ -340,8 +336,7 @@ void add_job(CLI::App& app, Action& chosen)
             const Plan p = make_plan(comm, *a);
             if (comm.rank() != 0) return Exit::Ok;
             if (p.machine.needs_account && a->account.empty())
-                fmt::print(stderr, "kuzure: jobs on {} need a project: write yours instead of PROJECT, or give --account\n",
-                           p.machine.name);
+                complain(fmt::format("jobs on {} need a project: write yours instead of PROJECT, or give --account", p.machine.name));
             fmt::print("{}{}", header(p, *a), body(p, *a));
             return Exit::Ok;
         };

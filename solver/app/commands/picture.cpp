@@ -18,28 +18,36 @@ struct Arguments {
     int threads = 0;
 };
 
-const std::vector<std::string> views{"oblique", "side", "top", "cut"}; // in the order of scene::View
+constexpr std::uint64_t most_scene_bytes = (std::uint64_t(1) << 20) + 4096; // what a run adds included
+const std::vector<std::string> views{"oblique", "side", "top", "cut"};      // in the order of scene::View
 
-/// The scene of a result directory. Throws BadInput where it is none.
-Scene scene_of(const Comm& comm, const io::Path& results)
+/// A result directory, held, and the scene in it. Throws BadInput where it is none.
+std::pair<io::Place, Scene> open_results(const Comm& comm, const io::Path& results)
 {
-    std::string text;
+    io::Place held;
+    std::string text, complaint;
     io::on_root(comm, [&] {
         std::error_code error;
         if (!std::filesystem::is_directory(results, error))
             throw BadInput(fmt::format("{}: expected the result directory of a run, found {}", results.string(),
                                        std::filesystem::exists(results, error) ? "a file" : "nothing"));
-        if (!std::filesystem::exists(results / "scene.toml", error))
+        held = io::hold(results);
+        if (!io::exists(held / "scene.toml"))
             throw BadInput(fmt::format("{}: expected the result directory of a run, found no scene.toml in it", results.string()));
-        text = io::read_scene_text(results / "scene.toml");
+        text = io::read_text(held / "scene.toml", most_scene_bytes);
     });
-    return io::parse_scene(comm.broadcast(text), (results / "scene.toml").string(), {}, scene::StepLimit::Force);
+    try {
+        if (!held.held()) held = io::hold(results);
+    } catch (const IoFailed& e) {
+        complaint = e.what();
+    }
+    io::agree(comm, complaint);
+    return {held, io::parse_scene(comm.broadcast(text), (results / "scene.toml").string(), {}, scene::StepLimit::Force)};
 }
 
 Exit draw(const Comm& comm, const Arguments& a)
 {
-    const io::Path results = a.results;
-    const Scene scene = scene_of(comm, results);
+    const auto [results, scene] = open_results(comm, a.results);
     auto task = picture_task(scene, results);
     const std::string color = task.color;
     const scene::View view = task.view;
@@ -48,8 +56,8 @@ Exit draw(const Comm& comm, const Arguments& a)
     if (!a.view.empty()) {
         const auto at = std::find(views.begin(), views.end(), a.view);
         if (at == views.end())
-            throw BadInput(fmt::format("--view: expected one of {}, found \"{}\"; did you mean \"{}\"?", fmt::join(views, ", "), a.view,
-                                       io::nearest(a.view, views)));
+            throw BadInput(
+                fmt::format("--view: expected one of {}, found \"{}\"{}", fmt::join(views, ", "), a.view, io::did_you_mean(a.view, views)));
         task.view = scene::View(at - views.begin());
         if (scene.dimensions == 2 && task.view != scene::View::Side)
             throw BadInput(fmt::format("--view {}: this run is 2-D and can be seen from the side only", a.view));
@@ -64,15 +72,17 @@ Exit draw(const Comm& comm, const Arguments& a)
     const bool same = task.color == color && (task.view == view || scene.dimensions == 2) && a.range.empty();
     if (!a.output.empty()) {
         if (!task.at) task.at = HUGE_VAL;
-        task.file = [&](int) { return io::Path(a.output); };
+        task.file = [&](int) { return io::Place(a.output); };
     } else if (!same) {
         const std::string seen = scene.dimensions == 2 ? "side" : views[std::size_t(task.view)];
-        task.file = [=](int number) { return results / fmt::format("picture_{}_{}_{:06d}.png", task.color, seen, number); };
+        task.file = [where = results, color = task.color, seen](int number) {
+            return where / fmt::format("picture_{}_{}_{:06d}.png", color, seen, number);
+        };
     }
     use_threads(comm, a.threads);
     const auto drawn = io::draw_pictures(comm, task);
     if (comm.rank() == 0) {
-        for (const auto& w : drawn.warnings) fmt::print(stderr, "kuzure: warning: {}\n", w);
+        for (const auto& w : drawn.warnings) complain("warning: " + w);
         for (const auto& f : drawn.files) fmt::print("{}\n", f.string());
     }
     return Exit::Ok;
@@ -80,7 +90,7 @@ Exit draw(const Comm& comm, const Arguments& a)
 
 } // namespace
 
-io::PictureTask picture_task(const Scene& scene, const io::Path& results)
+io::PictureTask picture_task(const Scene& scene, const io::Place& results)
 {
     const scene::Picture look = scene.output.picture.value_or(scene::Picture{});
     io::PictureTask task;
@@ -106,7 +116,9 @@ void add_picture(CLI::App& app, Action& chosen)
         ->type_name("LOW HIGH")
         ->expected(2);
     command->add_option("-o,--output", a->output, "one picture, of --at or of the end, into this file")->type_name("FILE");
-    command->add_option("--threads", a->threads, "threads of each rank (default: all cores)")->check(CLI::Range(1, 4096));
+    command->add_option("--threads", a->threads, "threads of each rank (default: all cores)")->check(CLI::Range(1, most_threads));
+    under_heading(*command, "What is shown", {"--color", "--view", "--at", "--range"});
+    under_heading(*command, "Machine", {"--threads"});
     command->callback([=, &chosen] { chosen = [=](const Comm& comm) { return draw(comm, *a); }; });
 }
 

@@ -1,6 +1,7 @@
 // kuzure run: the run loop, and everything a run leaves in its directory.
 #include "io/checkpoint.hpp"
 #include "io/history.hpp"
+#include "io/keys.hpp"
 #include "io/picture_series.hpp"
 #include "io/result_directory.hpp"
 #include "io/snapshot.hpp"
@@ -15,6 +16,8 @@
 #include "solver/app/measure.hpp"
 #include "solver/app/report/movie.hpp"
 #include "solver/app/report/report.hpp"
+#include "solver/app/signals.hpp"
+#include "solver/app/sound_state.hpp"
 #include "solver/app/status.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/core/simd.hpp"
@@ -22,8 +25,8 @@
 #include "solver/scene/check.hpp"
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <csignal>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
@@ -39,13 +42,29 @@ struct Arguments {
     double max_minutes = 0;
     bool force = false, force_size = false, quiet = false, plain = false;
     int recut_every = 0;
-    bool twins = false;
+    bool twins = false, check_only = false;
+    Progress progress = Progress::Auto;
+    // Of a twin: when the program it belongs to began (s), and the STOP file of the run it belongs to.
+    std::optional<double> began;
+    io::Path also_stop;
 };
 
-volatile std::sig_atomic_t asked_to_stop = 0;
-void on_signal(int) { asked_to_stop = 1; }
-
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// A simulation's clock as a checkpoint keeps it, with the greatest speed (m/s) of all legs.
+std::string header_text(const Simulation& sim, double peak_speed)
+{
+    auto j = nlohmann::ordered_json::parse(clock_text(sim));
+    j["peak_speed"] = peak_speed;
+    return j.dump();
+}
+
+/// The greatest speed (m/s) of the run up to a checkpoint; 0 where an older program left it out.
+double peak_speed_of(const io::Checkpoint& from)
+{
+    const auto j = nlohmann::json::parse(from.header, nullptr, false);
+    return j.is_object() && j.contains("peak_speed") && j["peak_speed"].is_number() ? j["peak_speed"].get<double>() : 0;
+}
 
 /// This rank's even share of all wall particles, for snapshots and pictures.
 io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const std::vector<Material>& soils)
@@ -67,9 +86,16 @@ public:
 
     Exit go()
     {
-        open();
-        if (args_.twins) run_twins();
-        return loop();
+        try {
+            open();
+            if (args_.twins && !run_twins()) return stop_before_the_run();
+            return loop();
+        } catch (const io::CheckpointFailed&) {
+            throw; // says itself which one is good
+        } catch (const IoFailed& e) {
+            if (!sim_) throw;
+            throw IoFailed(e.what() + last_good_checkpoint());
+        }
     }
 
 private:
@@ -80,8 +106,9 @@ private:
     {
     }
 
-    /// The coarser twins, before the run itself: what they leave becomes error bars at its end. A twin that fails costs its bar only.
-    void run_twins()
+    /// The coarser twins, before the run itself: what they leave becomes error bars at its end. A twin that fails costs its bar only; one
+    /// that was stopped goes on where the run is restarted. False if one was stopped.
+    bool run_twins()
     {
         for (const int factor : study::twin_factors) {
             study::TwinRun t;
@@ -89,23 +116,28 @@ private:
             t.directory = dir_->path() / "twins" / fmt::format("x{}", factor);
             try {
                 t.twin = study::coarsened(scene_, factor);
-                bool there = false;
-                if (args_.restart) {
+                std::string status; // of an earlier leg
+                if (args_.restart && comm_.rank() == 0) {
                     std::error_code ignored;
-                    there = comm_.rank() == 0 && std::filesystem::exists(t.directory / "summary.json", ignored);
-                    if (there) {
+                    if (std::filesystem::exists(t.directory / "summary.json", ignored)) {
                         const auto j = nlohmann::json::parse(io::read_text(t.directory / "summary.json"), nullptr, false);
-                        there = j.is_object() && j.value("status", "") == "finished" &&
-                                j.value("scene_hash", "") == io::scene_hash(t.twin.scene);
+                        if (j.is_object() && j.contains("status") && j["status"].is_string() && j.contains("scene_hash") &&
+                            j["scene_hash"] == io::scene_hash(t.twin.scene))
+                            status = j["status"];
                     }
-                    there = comm_.max(std::int64_t(there)) > 0;
+                    if (status.empty() && std::filesystem::exists(t.directory / "checkpoint.h5", ignored)) status = "killed";
                 }
-                if (!there) {
+                status = comm_.broadcast(status);
+                if (status != "finished") {
                     Arguments a = args_;
-                    a.output = t.directory.string(), a.twins = false, a.quiet = true, a.restart.reset(), a.force = true;
+                    a.output = t.directory.string(), a.twins = false, a.quiet = true, a.force = true;
+                    a.began = start_, a.also_stop = dir_->stop().path();
+                    if (status.empty()) a.restart.reset();
+                    else a.restart = ""; // its own newest checkpoint
                     say(fmt::format("twin of {} times the spacing, in {}", factor, t.directory.string()));
                     scene::Issues issues; // coarsened() threw where one is an error
-                    Run(comm_, a, scene::ready(t.twin.scene, scene::StepLimit::Force, issues).value(), true).go();
+                    if (Run(comm_, a, scene::ready(t.twin.scene, scene::StepLimit::Force, issues).value(), true).go() == Exit::Stopped)
+                        return false;
                 }
             } catch (const BadInput& e) {
                 t.failed = e.what();
@@ -115,6 +147,25 @@ private:
             if (!t.failed.empty()) say(fmt::format("the twin of {} times the spacing failed: {}", factor, t.failed));
             twins_.push_back(std::move(t));
         }
+        return true;
+    }
+
+    /// A twin was stopped: the run's own checkpoint, of where it stands, lets a restart find the directory and go on with the twin.
+    Exit stop_before_the_run()
+    {
+        first_step_ = sim_->steps();
+        write_checkpoint();
+        write_summary("stopped", Exit::Stopped);
+        return say_stopped();
+    }
+
+    Exit say_stopped()
+    {
+        const auto text = fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)", sim_->time(),
+                                      sim_->steps(), checkpoint_.string());
+        if (args_.quiet && comm_.rank() == 0 && !twin_) std::fprintf(stderr, "kuzure: %s\n", text.c_str());
+        say(text);
+        return Exit::Stopped;
     }
 
     void say(const std::string& text)
@@ -127,23 +178,27 @@ private:
     void warn(const std::string& text)
     {
         warnings_.push_back(text);
-        if (comm_.rank() == 0 && !twin_) fmt::print(stderr, "kuzure: warning: {}\n", text);
+        if (comm_.rank() == 0 && !twin_) complain("warning: " + text);
     }
 
     void open()
     {
         for (const auto& issue : doubts_) warn(in_words(issue));
+        if (const auto why = too_many_threads(comm_, threads_); !why.empty()) warn(why);
         const io::Path where = args_.scene.results(scene_, args_.output);
         std::optional<io::Checkpoint> from;
+        // From here on no other run touches what is there.
+        const auto existing = args_.restart ? io::Existing::GoOn : args_.force ? io::Existing::MoveAside : io::Existing::Refuse;
+        dir_.emplace(comm_, where, existing, complain);
         if (args_.restart) {
             if (!args_.restart->empty()) from = io::verify_checkpoint(comm_, *args_.restart);
-            else from = io::newest_good(comm_, where, [&](const std::string& s) { fmt::print(stderr, "kuzure: {}\n", s); });
+            else from = io::newest_good(comm_, dir_->place(), complain);
             if (!from) say(fmt::format("no checkpoint in {}: starting from the beginning", where.string()));
         }
         bool here = true; // of another directory nothing is touched
         if (from) {
             std::error_code error;
-            here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file), error));
+            here = comm_.any(comm_.rank() == 0 && std::filesystem::equivalent(where, io::directory_of(from->file).path(), error));
             require_same_scene(comm_, *from, scene_);
             if (!here) require_room_for(*from, where);
         }
@@ -156,20 +211,24 @@ private:
         std::optional<double> restart_time;
         if (from) {
             Particles p;
-            io::read_checkpoint(comm_, from->file, p);
+            io::read_checkpoint(comm_, *from, p);
             const Clock clock = clock_from_text(from->header, from->file);
-            restart_time = clock.time;
-            dir_.emplace(comm_, where, io::Existing::GoOn);
-            checkpoint_ = here ? io::keep_generation(comm_, *from) : from->file;
+            restart_time = clock.time, peak_speed_ = peak_speed_of(*from);
+            require_sound_state(comm_, *from, p, scene_, *options.filling);
+            const auto fields = field_names(p);
+            checkpoint_ = from->file;
             sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
+            require_fields(comm_, *from, fields, sim_->particles());
+            dir_->make(io::Existing::GoOn);
+            if (here) checkpoint_ = io::keep_generation(comm_, *from);
             say(fmt::format("going on from {} at t = {:g} s, step {}", from->file.string(), clock.time, clock.step));
             if (const auto writer = other_writer(*from); !writer.empty())
                 warn(fmt::format("this checkpoint was written by {}; this is {}: the bits from here on may be others", writer,
                                  version_text()));
         } else {
-            dir_.emplace(comm_, where, args_.force || args_.restart ? io::Existing::MoveAside : io::Existing::Refuse);
+            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options)); // what it refuses leaves nothing behind
+            dir_->make(args_.restart ? io::Existing::MoveAside : existing);
             if (!dir_->moved_to().empty()) say(fmt::format("the old results are now in {}", dir_->moved_to().string()));
-            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options));
         }
         io::on_root(comm_, [&] {
             char host[256] = "";
@@ -177,8 +236,7 @@ private:
             io::write_atomically(dir_->scene(),
                                  fmt::format("# {}\n# host {}, {} ranks x {} threads, scene hash {}, pair model {}\n{}", version_text(),
                                              host, comm_.size(), threads_, hash_, sim_->model().name(), io::write_scene(scene_)));
-            std::filesystem::create_directories(dir_->snapshots());
-            std::filesystem::remove(dir_->stop());
+            io::remove_file(dir_->stop());
         });
         walls_ = wall_share(comm_, sim_->filling(), {sim_->soils().begin(), sim_->soils().end()});
         snapshots_.emplace(comm_, dir_->snapshots(), restart_time);
@@ -282,8 +340,8 @@ private:
         if (!scene_.output.picture) return;
         sim_->timers().timed(Phase::Picture, [&] {
             try {
-                io::remove_pictures(comm_, dir_->path()); // also those of snapshots that a restart took back
-                auto task = picture_task(scene_, dir_->path());
+                io::remove_pictures(comm_, dir_->place()); // also those of snapshots that a restart took back
+                auto task = picture_task(scene_, dir_->place());
                 task.tolerant = true;
                 for (const auto& w : io::draw_pictures(comm_, task).warnings) warn(w);
             } catch (const BadInput& e) {
@@ -307,7 +365,8 @@ private:
     {
         sim_->timers().timed(Phase::Checkpoint, [&] {
             history_->sync();
-            checkpoint_ = io::write_checkpoint(comm_, dir_->path(), sim_->particles(), hash_, clock_text(*sim_));
+            dir_->require_owned();
+            checkpoint_ = io::write_checkpoint(comm_, dir_->place(), sim_->particles(), hash_, header_text(*sim_, peak_speed_));
         });
         last_checkpoint_ = now();
     }
@@ -349,6 +408,7 @@ private:
         j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
         j["retries"] = retries_;
         j["peak_speed"] = peak_speed_;
+        if (heap_) j["soil_off_ground"] = heap_->off_ground;
         if (args_.twins && code == Exit::Ok) {
             io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, dir_->path(), peak_speed_, twins_); });
             if (speaks_)
@@ -362,8 +422,8 @@ private:
         if (comm_.rank() == 0) report.machine = kept_machine(instruction_set(), on_node);
         if (!report.machine && comm_.size() == 1 && loop_seconds_ > 20) report.machine = this_machine(instruction_set(), on_node);
         io::on_root(comm_, [&] {
-            io::write_atomically(dir_->path() / "timers.json", report.json());
-            io::write_atomically(dir_->path() / "timers.txt", report.text());
+            io::write_atomically(*dir_ / "timers.json", report.json());
+            io::write_atomically(*dir_ / "timers.txt", report.text());
         });
     }
 
@@ -371,15 +431,16 @@ private:
     void write_report()
     {
         if (comm_.rank() != 0) return;
+        if (!dir_->in_place()) return complain(fmt::format("warning: no report.html: {} was moved meanwhile", dir_->path().string()));
         try {
             if (scene_.output.movie) say(fmt::format("film: {}", report::write_movie(dir_->path()).string()));
         } catch (const std::exception& e) {
-            fmt::print(stderr, "kuzure: warning: {}\n", e.what());
+            complain(fmt::format("warning: {}", e.what()));
         }
         try {
             report::write_report(dir_->path());
         } catch (const std::exception& e) {
-            fmt::print(stderr, "kuzure: warning: no report.html: {}\n", e.what());
+            complain(fmt::format("warning: no report.html: {}", e.what()));
         }
     }
 
@@ -398,12 +459,11 @@ private:
     {
         Requests w;
         const double t = now();
-        w.stop = asked_to_stop != 0 || (args_.max_minutes > 0 && t - start_ > 60 * args_.max_minutes);
+        w.stop = asked_to_stop() || (args_.max_minutes > 0 && t - args_.began.value_or(start_) > 60 * args_.max_minutes);
         if (comm_.rank() == 0) {
             if (t - last_look_ > 1) {
                 last_look_ = t;
-                std::error_code ignored;
-                stop_file_ = std::filesystem::exists(dir_->stop(), ignored);
+                stop_file_ = io::exists(dir_->stop()) || !dir_->owned() || (!args_.also_stop.empty() && io::exists(args_.also_stop));
             }
             w.stop = w.stop || stop_file_;
             w.checkpoint = t - last_checkpoint_ > 60 * scene_.output.checkpoint_minutes;
@@ -433,9 +493,8 @@ private:
 
     Exit loop()
     {
-        std::signal(SIGTERM, on_signal), std::signal(SIGINT, on_signal), std::signal(SIGUSR1, on_signal);
         Simulation& sim = *sim_;
-        status_.emplace(speaks_, scene_.time.end, sim.time(), sim.steps());
+        status_.emplace(speaks_, args_.progress, scene_.time.end, sim.time(), sim.steps());
         const auto look = [&](bool final) {
             if (!status_->due(final)) return;
             status_->show({sim.time(), sim.steps(), sim.dt(), sim.max_speed(), residual_, heap_, scene_.dimensions, comm_.size(),
@@ -461,11 +520,7 @@ private:
                     draw_pictures();
                     write_summary("stopped", Exit::Stopped);
                     write_report();
-                    const auto text = fmt::format("stopped on request at t = {:g} s, step {}; checkpoint {} (go on with --restart)",
-                                                  sim.time(), sim.steps(), checkpoint_.string());
-                    if (args_.quiet && comm_.rank() == 0) std::fprintf(stderr, "kuzure: %s\n", text.c_str());
-                    say(text);
-                    return Exit::Stopped;
+                    return say_stopped();
                 }
                 if (w.checkpoint) write_checkpoint();
             }
@@ -485,10 +540,6 @@ private:
                 text += fmt::format(". It could not be saved: {}", io.what());
             }
             throw NumbersFailed(text);
-        } catch (const io::CheckpointFailed&) {
-            throw; // says itself which one is good
-        } catch (const IoFailed& e) {
-            throw IoFailed(e.what() + last_good_checkpoint());
         }
         look(true);
         draw_pictures();
@@ -517,7 +568,7 @@ private:
     std::optional<io::Snapshots> snapshots_;
     std::optional<io::History> history_;
     std::optional<io::ProgressLog> progress_;
-    io::Path checkpoint_;
+    io::Place checkpoint_;
     double last_checkpoint_ = 0, last_look_ = 0, loop_seconds_ = 0, logged_wall_ = 0;
     std::optional<double> residual_; // of the last row of the history
     std::optional<Heap> heap_;
@@ -526,7 +577,7 @@ private:
     bool stop_file_ = false;
     std::int64_t first_step_ = 0, logged_step_ = 0;
     std::vector<nlohmann::ordered_json> retries_;
-    double peak_speed_ = 0; // m/s, over the steps of this process
+    double peak_speed_ = 0; // m/s, over all steps
     std::vector<study::TwinRun> twins_;
 };
 
@@ -554,20 +605,33 @@ void add_run(CLI::App& app, Action& chosen)
                            : fmt::format("expected minutes above 0, such as 90 or 0.5, found \"{}\"", text);
             },
             "");
-    command->add_flag("--quiet", a->quiet, "print nothing but errors, warnings, and where a stopped run left its checkpoint");
+    command->add_flag("-n,--dry-run", a->check_only, "say what kuzure check says, and run nothing");
+    command->add_option("--progress", a->progress, "auto (a bar on a terminal of its own, lines elsewhere), bar, plain or none")
+        ->type_name("HOW")
+        ->transform(CLI::Validator(
+            [](std::string& how) {
+                const auto& names = progress_names();
+                const auto found = std::find(names.begin(), names.end(), how);
+                if (found == names.end())
+                    return fmt::format("expected {}, found \"{}\"{}", fmt::join(names, ", "), how, io::did_you_mean(how, names));
+                how = std::to_string(found - names.begin());
+                return std::string();
+            },
+            ""));
+    command->add_flag("-q,--quiet", a->quiet, "print nothing but errors, warnings, and where a stopped run left its checkpoint");
     command->add_flag("--force", a->force, "move an existing result directory aside");
     command->add_flag("--force-size", a->force_size, "start although memory or disk will not be enough by kuzure's estimate");
     command->add_flag("--twins", a->twins, "first the same at 2 and 4 times the spacing: error bars on run-out, height and peak speed");
     command->add_flag("--plain", a->plain, "scalar arithmetic instead of lanes: the slow reference")->group("");
     command->add_option("--recut-every", a->recut_every, "cut the domain anew at every so many list rebuilds")->group("");
-    under_heading(*command, "Scene", {"--set", "--force-step"});
-    under_heading(*command, "Results", {"--output", "--force", "--quiet"});
+    under_heading(*command, "Scene", {"--set", "--force-step", "--dry-run"});
+    under_heading(*command, "Results", {"--output", "--force", "--quiet", "--progress"});
     under_heading(*command, "How accurate", {"--twins"});
     under_heading(*command, "Start and stop", {"--restart", "--max-minutes"});
     under_heading(*command, "Machine", {"--threads", "--force-size"});
     command->callback([=, &chosen] {
         if (restarts->count() > 0) a->restart = *restart == "newest" ? "" : *restart;
-        chosen = [=](const Comm& comm) { return Run(comm, *a).go(); };
+        chosen = [=](const Comm& comm) { return a->check_only ? tell_of_run(comm, a->scene) : Run(comm, *a).go(); };
     });
 }
 

@@ -39,13 +39,12 @@ struct State {
 State state_of(const Comm& comm, const Scene& s, const io::Path& from)
 {
     const bool directory = std::filesystem::is_directory(from);
-    const auto say = [](const std::string& text) { fmt::print(stderr, "kuzure: {}\n", text); };
-    const auto found = directory ? io::newest_good(comm, from, say) : io::verify_checkpoint(comm, from);
+    const auto found = directory ? io::newest_good(comm, from, complain) : io::verify_checkpoint(comm, from);
     if (!found)
         throw BadInput(fmt::format("--from {}: expected a checkpoint or a result directory that holds one, found none", from.string()));
     require_same_scene(comm, *found, s);
     Particles p;
-    io::read_checkpoint(comm, found->file, p);
+    io::read_checkpoint(comm, *found, p);
     std::vector<Vector> x(std::size_t(p.size())), way(x.size());
     const Vector low = s.space.low.value_or(Vector{}), length = period(s);
     const auto wrapped = [&](int axis, double v, double lo, double all) {

@@ -54,7 +54,9 @@ public:
         if (std::filesystem::exists(out_) && !std::filesystem::is_directory(out_))
             throw BadInput(fmt::format("{}: expected a directory, found a file; choose another with -o DIR", out_.string()));
         std::error_code error;
-        if (std::filesystem::is_directory(out_) && !std::filesystem::is_empty(out_, error) && !std::filesystem::exists(out_ / "sweep.toml"))
+        // A sweep.toml alone may be the user's own.
+        const bool ours = std::filesystem::exists(out_ / "sweep.toml", error) && std::filesystem::is_directory(out_ / "points", error);
+        if (std::filesystem::is_directory(out_) && !std::filesystem::is_empty(out_, error) && !ours)
             throw BadInput(fmt::format(
                 "{}: expected a new directory or that of a study, found one with other things in it; choose another with -o DIR",
                 out_.string()));
@@ -101,8 +103,21 @@ public:
             pairs_left -= p.predicted_pairs;
         }
 
-        for (auto& p : study_.points)
-            if (p.finished()) study::measure(study_, p, folder(p) / "run");
+        for (auto& p : study_.points) {
+            if (!p.finished()) continue;
+            const auto damaged = [&](const std::exception& e) {
+                return IoFailed(
+                    fmt::format("{}: damaged results ({}). Remedy: remove this directory; the same command runs the point again",
+                                folder(p).string(), e.what()));
+            };
+            try {
+                study::measure(study_, p, folder(p) / "run");
+            } catch (const nlohmann::json::exception& e) {
+                throw damaged(e);
+            } catch (const std::out_of_range& e) {
+                throw damaged(e);
+            }
+        }
         study::compare(study_);
         const auto problems = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return !p.finished(); });
         io::write_atomically(out_ / "study.json", study::to_json(study_).dump(1) + "\n");

@@ -72,9 +72,9 @@ std::string chart(const std::string& title, const std::string& x_name, const std
     for (const auto& c : curves)
         for (const double v : c.y)
             if (std::isfinite(v)) lo = std::min(lo, v), hi = std::max(hi, v);
-    if (x.size() < 2 || !(x.back() > x.front()) || lo > hi)
+    if (x.size() < 2 || !(x.back() - x.front() > 1e-9 * std::max({std::fabs(x.front()), std::fabs(x.back()), 1e-200})) || lo > hi)
         return "<figure>" + caption + "<p class=\"soft small\">Fewer than two rows were written: no curve.</p></figure>";
-    if (hi - lo < 1e-12 * std::max(std::fabs(lo), std::fabs(hi)) || hi == lo)
+    if (hi - lo < std::max(1e-200, 1e-12 * std::max(std::fabs(lo), std::fabs(hi))))
         lo -= 0.5 * std::max(1e-12, std::fabs(lo)), hi = lo + std::max(2e-12, 2 * std::fabs(hi));
     const double step = tick_step(hi - lo, 5), x0 = x.front(), x1 = x.back(), x_step = tick_step(x1 - x0, 6);
     lo = std::floor(lo / step + 1e-9) * step, hi = std::ceil(hi / step - 1e-9) * step;
@@ -84,10 +84,10 @@ std::string chart(const std::string& title, const std::string& x_name, const std
     const auto py = [&](double v) { return top + (height - top - bottom) * (hi - v) / (hi - lo); };
 
     std::string s = "<figure>" + caption + head(title, x_name + " [" + x_unit + "]");
-    for (double v = lo; v <= hi + 1e-6 * step; v += step)
+    for (double v = lo; v <= hi + 1e-6 * step && v + step > v; v += step)
         s += line(std::fabs(v) < 1e-9 * step ? "axis" : "grid", left, py(v), width - right, py(v)) +
              label(left - 7, py(v) + 4, "end", tick_text(v * p.factor, step * p.factor));
-    for (double v = std::ceil(x0 / x_step - 1e-9) * x_step; v <= x1 + 1e-6 * x_step; v += x_step)
+    for (double v = std::ceil(x0 / x_step - 1e-9) * x_step; v <= x1 + 1e-6 * x_step && v + x_step > v; v += x_step)
         s += line("grid", px(v), top, px(v), height - bottom) + label(px(v), height - bottom + 17, "middle", tick_text(v, x_step));
     if (!unit.empty())
         s += fmt::format("<text transform=\"translate(13 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
@@ -101,7 +101,7 @@ std::string chart(const std::string& title, const std::string& x_name, const std
         double last = std::nan("");
         for (std::size_t i = 0; i < n; ++i) {
             if (i % every != 0 && i + 1 != n) continue;
-            if (!std::isfinite(c.y[i])) {
+            if (!std::isfinite(c.y[i]) || !std::isfinite(x[i])) {
                 pen_down = false;
                 continue;
             }

@@ -1,39 +1,23 @@
 #include "solver/app/report/movie.hpp"
 #include "io/picture_series.hpp"
+#include "solver/app/program.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <vector>
-
-extern char** environ;
 
 namespace kuzure::report {
 
 namespace {
 /// Exit code of ffmpeg; throws where there is no such program.
-int ffmpeg(std::vector<std::string> words)
+int ffmpeg(std::vector<std::string> words, const io::Path& directory)
 {
-    std::vector<char*> argv;
-    for (auto& w : words) argv.push_back(w.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t files;
-    posix_spawn_file_actions_init(&files);
-    for (const int fd : {0, 1, 2}) posix_spawn_file_actions_addopen(&files, fd, "/dev/null", fd == 0 ? O_RDONLY : O_WRONLY, 0);
-    pid_t child = 0;
-    const int error = posix_spawnp(&child, "ffmpeg", &files, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&files);
-    if (error == ENOENT)
+    const auto code = run_program(std::move(words), directory);
+    if (!code)
         throw IoFailed(
             "no film: ffmpeg is not installed. Remedy: apt-get install ffmpeg, then kuzure report --movie; the pictures are there");
-    if (error != 0) throw IoFailed(fmt::format("no film: ffmpeg could not be started ({})", std::strerror(error)));
-    int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return *code;
 }
 /// A path as a pattern that only it fits.
 std::string literal(const io::Path& path)
@@ -67,8 +51,9 @@ io::Path write_movie(const io::Path& where)
             "ffmpeg", "-y", "-nostdin", "-framerate", rate, "-pattern_type", "glob", "-i", literal(directory) + "/picture_[0-9]*.png"};
         words.insert(words.end(), coding.begin(), coding.end());
         words.push_back((directory / part).string());
-        const int code = ffmpeg(words);
         std::error_code ignored;
+        std::filesystem::remove(directory / part, ignored); // what lies there may be a link
+        const int code = ffmpeg(words, directory);
         if (code == 0) {
             for (const auto& way : ways) std::filesystem::remove(directory / way.first, ignored);
             std::filesystem::rename(directory / part, directory / name);

@@ -1,4 +1,5 @@
 #include "solver/app/report/page.hpp"
+#include "io/quote.hpp"
 #include <algorithm>
 #include <cstdint>
 
@@ -57,9 +58,9 @@ pre{white-space:pre-wrap;overflow:visible}details>summary,video{display:none}.pi
 )css";
 } // namespace
 
-std::string escaped(std::string_view s)
+namespace {
+void escape(std::string_view s, std::string& out)
 {
-    std::string out;
     for (const char c : s) switch (c) {
         case '&':
             out += "&amp;";
@@ -77,8 +78,21 @@ std::string escaped(std::string_view s)
             out += "&#39;";
             break;
         default:
-            out += c;
+            // Pages have no other control characters.
+            if ((unsigned char)(c) < 0x20 && c != '\n' && c != '\t') out += "\ufffd";
+            else out += c;
         }
+}
+} // namespace
+
+std::string escaped(std::string_view s)
+{
+    std::string out;
+    for (auto bad = io::malformed(s); bad != s.npos; bad = io::malformed(s)) { // a page is UTF-8
+        escape(s.substr(0, bad), out), out += "\ufffd";
+        s.remove_prefix(bad + 1);
+    }
+    escape(s, out);
     return out;
 }
 

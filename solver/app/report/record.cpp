@@ -8,38 +8,69 @@
 
 namespace kuzure::report {
 
+double usable(double x) { return std::fabs(x) <= 1e100 ? x : std::nan(""); }
+
 Table read_table(const std::string& text)
 {
+    const std::size_t most_columns = 1000;
     Table t;
-    std::vector<std::string> names;
+    std::vector<std::vector<double>*> columns;
+    std::vector<double> row;
     std::size_t at = 0;
     for (int line = 0; at < text.size(); ++line) {
-        const std::size_t end = text.find('\n', at);
-        if (end == std::string::npos) break; // a torn last row
-        const std::string_view row(text.data() + at, end - at);
+        const std::size_t end = std::min(text.find('\n', at), text.size());
+        const std::string_view cells(text.data() + at, end - at);
         at = end + 1;
         if (line == 1) continue; // units
-        std::size_t column = 0;
-        for (std::size_t from = 0; from <= row.size(); ++column) {
-            const std::size_t to = std::min(row.find(',', from), row.size());
-            const auto cell = row.substr(from, to - from);
-            if (line == 0) names.emplace_back(cell);
-            else if (column < names.size()) {
+        const auto count = std::size_t(std::count(cells.begin(), cells.end(), ',')) + 1;
+        if (line == 0 ? count > most_columns : count != columns.size()) {
+            if (line == 0) return {};
+            continue;
+        }
+        row.clear();
+        for (std::size_t from = 0; from <= cells.size();) {
+            const std::size_t to = std::min(cells.find(',', from), cells.size());
+            const auto cell = cells.substr(from, to - from);
+            if (line == 0) columns.push_back(&t[std::string(cell)]); // two of one name are one column, which no name finds twice
+            else {
                 double v = 0;
                 const bool read = std::from_chars(cell.data(), cell.data() + cell.size(), v).ec == std::errc{};
-                t[names[column]].push_back(read ? v : std::nan(""));
+                row.push_back(read ? usable(v) : std::nan(""));
             }
             from = to + 1;
         }
-        if (line > 0)
-            for (; column < names.size(); ++column) t[names[column]].push_back(std::nan(""));
+        if (line == 0 && t.size() != columns.size()) return {};
+        for (std::size_t k = 0; k < row.size(); ++k) columns[k]->push_back(row[k]);
     }
     return t;
 }
 
+namespace {
+
+constexpr std::uint64_t MiB = std::uint64_t(1) << 20;
+
+/// Parsed JSON, or a discarded value for what is none or lies deeper than a run writes: the library goes down by calling itself.
+nlohmann::json parse_json(const std::string& text)
+{
+    int depth = 0, deepest = 0;
+    bool inside = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        if (inside) {
+            if (c == '\\') ++i;
+            else inside = c != '"';
+        } else if (c == '"') inside = true;
+        else if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
+        else if (c == ']' || c == '}') --depth;
+    }
+    return deepest <= 64 ? nlohmann::json::parse(text, nullptr, false) : nlohmann::json(nlohmann::json::value_t::discarded);
+}
+
+} // namespace
+
 double Record::number(const char* key) const
 {
-    return summary.contains(key) && summary[key].is_number() ? summary[key].get<double>() : std::nan("");
+    return summary.contains(key) && summary[key].is_number() ? usable(summary[key].get<double>()) : std::nan("");
 }
 std::string Record::text(const char* key) const
 {
@@ -48,15 +79,31 @@ std::string Record::text(const char* key) const
 
 Record read_record(const io::Path& directory)
 {
-    const auto there = [&](const char* name) { return std::filesystem::exists(directory / name); };
+    // Held: nothing is read through links, which in a directory from somebody else may lead to anything of ours.
+    io::Place held;
+    try {
+        held = io::hold(directory);
+    } catch (const IoFailed&) { // not there, or no directory: said below
+    }
+    const auto place = [&](const std::string& name) {
+        const auto slash = name.find('/');
+        return slash == name.npos ? held / name : io::hold(held / name.substr(0, slash)) / name.substr(slash + 1);
+    };
+    const auto there = [&](const char* name) {
+        try {
+            return held.held() && io::exists(place(name));
+        } catch (const IoFailed&) {
+            return false;
+        }
+    };
     if (!there("summary.json") && !there("scene.toml"))
         throw BadInput(
             fmt::format("{}: neither summary.json nor scene.toml here. Expected: the result directory of a run", directory.string()));
     Record r;
     r.directory = directory;
-    const auto text = [&](const char* name, const char* meaning) -> std::string {
+    const auto text = [&](const char* name, const char* meaning, std::uint64_t most = 16 * MiB) -> std::string {
         try {
-            if (there(name)) return io::read_text(directory / name);
+            if (there(name)) return io::read_text(place(name), most);
             r.gaps.push_back(fmt::format("{} is missing: {}.", name, meaning));
         } catch (const IoFailed& e) {
             r.gaps.push_back(e.what());
@@ -65,16 +112,17 @@ Record read_record(const io::Path& directory)
     };
     const auto object = [&](const char* name, const char* meaning) {
         const std::string t = text(name, meaning);
-        auto j = nlohmann::json::parse(t, nullptr, false);
+        auto j = parse_json(t);
         if (j.is_object()) return j;
         if (!t.empty()) r.gaps.push_back(fmt::format("{} is damaged: {}.", name, meaning));
         return nlohmann::json::object();
     };
     r.summary = object("summary.json", "the run goes on, or was killed before it could write its end");
     r.timers = object("timers.json", "no times by phase");
-    r.history = read_table(text("history.csv", "no curves"));
-    if (there("progress.csv")) r.progress = read_table(text("progress.csv", ""));
-    r.scene = text("scene.toml", "the scene is unknown");
+    r.history = read_table(text("history.csv", "no curves", 128 * MiB));
+    if (there("progress.csv")) r.progress = read_table(text("progress.csv", "no speed over time", 128 * MiB));
+    if (r.history.empty() && there("history.csv")) r.gaps.push_back("history.csv is damaged: no curves.");
+    r.scene = text("scene.toml", "the scene is unknown", MiB + 4096);
     r.title = directory.filename().empty() ? directory.parent_path().filename().string() : directory.filename().string();
     if (!r.scene.empty()) {
         try {
@@ -88,25 +136,25 @@ Record read_record(const io::Path& directory)
     }
     std::error_code error;
     for (const auto& e : std::filesystem::directory_iterator(directory, error)) {
-        if (io::picture_number(e.path()) && e.file_size(error) > 0) r.pictures.push_back(e.path());
+        if (io::picture_number(e.path()) && !e.is_symlink(error) && e.file_size(error) > 0) r.pictures.push_back(e.path());
     }
     std::sort(r.pictures.begin(), r.pictures.end());
     // Pictures carry the number of their snapshot, whose time the series tells.
     std::map<std::string, double> times;
     if (there("snapshots/state.hdf.series")) {
-        const auto series = nlohmann::json::parse(text("snapshots/state.hdf.series", ""), nullptr, false);
+        const auto series = parse_json(text("snapshots/state.hdf.series", "times of pictures are unknown"));
         if (series.is_object() && series.contains("files") && series["files"].is_array())
             for (const auto& file : series["files"])
                 if (file.is_object() && file.contains("name") && file["name"].is_string() && file.contains("time") &&
                     file["time"].is_number())
-                    times[file["name"].get<std::string>()] = file["time"].get<double>();
+                    times[file["name"].get<std::string>()] = usable(file["time"].get<double>());
     }
     for (const auto& p : r.pictures) {
         const auto at = times.find("state_" + p.stem().string().substr(8) + ".hdf");
         r.picture_times.push_back(at == times.end() ? std::nan("") : at->second);
     }
     for (const char* name : {"movie.mp4", "movie.webm", "movie.gif"})
-        if (r.movie.empty() && there(name)) r.movie = directory / name;
+        if (r.movie.empty() && there(name) && !std::filesystem::is_symlink(directory / name, error)) r.movie = directory / name;
     return r;
 }
 

@@ -11,8 +11,11 @@ namespace kuzure::report {
 
 /// Columns of a table of rows by name; cells that are no numbers are NaN.
 using Table = std::map<std::string, std::vector<double>>;
-/// The table of a text: a line of names, a line of units, rows. A torn last row is left out.
+/// The table of a text: a line of names, a line of units, rows. Rows with other than a cell for each name, such as a torn last one, are
+/// left out. Empty where the first line names more than 1000 columns.
 Table read_table(const std::string& text);
+/// A number that a figure or a sentence can hold: finite and at most 1e100 either way, else NaN.
+double usable(double);
 
 struct Record {
     io::Path directory;

@@ -12,10 +12,13 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::uint64_t largest_picture = std::uint64_t(64) << 20, largest_movie = std::uint64_t(512) << 20; // bytes, in a page
+constexpr std::size_t most_notes = 100;
+
 /// "3 min 20 s"
 std::string duration(double seconds)
 {
-    if (!std::isfinite(seconds)) return "-";
+    if (!(std::fabs(seconds) < 1e12)) return "-";
     if (seconds < 1) return fmt::format("{:.2f} s", seconds);
     if (seconds < 100) return fmt::format("{:.1f} s", seconds);
     const auto s = std::llround(seconds);
@@ -40,13 +43,22 @@ double at(const Json& j, std::initializer_list<const char*> path)
         if (!here->is_object() || !here->contains(key)) return std::nan("");
         here = &(*here)[key];
     }
-    return here->is_number() ? here->get<double>() : std::nan("");
+    return here->is_number() ? usable(here->get<double>()) : std::nan("");
 }
 
 /// Of numbers that may not be there, which are no error: x > y, or no.
 bool more(double x, double y) { return std::isgreater(x, y); }
 /// a/b, or no number.
 double ratio(double a, double b) { return more(b, 0) ? a / b : std::nan(""); }
+
+/// The string of a key, or nothing.
+std::string word(const Json& j, const char* key)
+{
+    return j.is_object() && j.contains(key) && j[key].is_string() ? j[key].get<std::string>() : std::string();
+}
+
+/// Seconds with three digits behind the point, or a dash.
+std::string fixed(double seconds) { return std::fabs(seconds) < 1e12 ? fmt::format("{:.3f}", seconds) : "-"; }
 
 /// Strings of an array, if it is one.
 std::vector<std::string> strings(const Json& j, const char* key)
@@ -98,15 +110,14 @@ std::string error_bars(const Record& r)
         if (!bars.contains(name)) continue;
         const auto& bar = bars[name];
         const double value = at(bar, {"value"}), half_width = at(bar, {"half_width"});
-        const std::string unit = escaped(bar.value("unit", ""));
+        const std::string unit = escaped(word(bar, "unit"));
         rows += fmt::format("<tr><td>{}</td><td>{}</td></tr>", name,
                             std::isfinite(half_width)
-                                ? fmt::format("{:.4g} &plusmn; {:.2g} {}", value, half_width, unit)
-                                : fmt::format("{:.4g} {}; no interval: {}", value, unit, escaped(bar.value("no_interval", ""))));
+                                ? fmt::format("{} &plusmn; {:.2g} {}", shown(value), half_width, unit)
+                                : fmt::format("{} {}; no interval: {}", shown(value), unit, escaped(word(bar, "no_interval"))));
     }
-    return fmt::format(
-        "<p>From the same scene at 2 and 4 times the spacing; run-out where the heap is {:g} m high.</p>\n<table>{}</table>\n",
-        at(bars, {"grain"}), rows);
+    return fmt::format("<p>From the same scene at 2 and 4 times the spacing; run-out where the heap is {} m high.</p>\n<table>{}</table>\n",
+                       shown(at(bars, {"grain"})), rows);
 }
 
 // ---- what happened -------------------------------------------------------------------------------------------------
@@ -122,7 +133,7 @@ Verdict verdict(const Record& r)
     if (!std::isfinite(t)) t = last(r.history, "time");
     const std::string of = r.end_time && std::isfinite(t) ? fmt::format(" of {:g} s ({:.0f} %)", *r.end_time, 100 * t / *r.end_time) : " s";
     const std::string when = std::isfinite(t) ? fmt::format("t = {:g}{}", t, r.end_time ? " s" + of : of) : "the beginning";
-    if (status == "finished") return {"good", fmt::format("Finished: the run reached its end, t = {:g} s.", t), message};
+    if (status == "finished") return {"good", fmt::format("Finished: the run reached its end, t = {} s.", shown(t)), message};
     if (status == "stopped")
         return {"warn", fmt::format("Stopped on request at {} (exit code 5).", when),
                 "A checkpoint was written: kuzure run with --restart goes on from it, to the same bits as a run never stopped."};
@@ -160,18 +171,21 @@ std::string opening(const Record& r)
     s += card("ranks \u00d7 threads", grouped(r.number("ranks")) + " \u00d7 " + grouped(r.number("threads")), r.text("precision"));
     s += card("speed", shown(r.number("particle_steps_per_second"), true) + "/s", "soil-particle steps");
     s += card("height", shown(last(r.history, "height")) + " m", "at the last row");
+    if (const double off = r.number("soil_off_ground"); more(off, 0))
+        s += card("off the ground", fmt::format("{:.3g} %", 100 * off), "of the soil, below or beyond all walls");
     s += card("front along x", fmt::format("{} to {} m", shown(last(r.history, "front_min_x")), shown(last(r.history, "front_max_x"))));
     if (!r.flat)
         s += card("front along y", fmt::format("{} to {} m", shown(last(r.history, "front_min_y")), shown(last(r.history, "front_max_y"))));
     s += "</dl>\n</header>\n";
     std::string notes;
-    for (const auto& w : strings(r.summary, "warnings")) notes += "<li>" + escaped(w) + "</li>";
+    const auto warnings = strings(r.summary, "warnings");
+    for (std::size_t k = 0; k < std::min(warnings.size(), most_notes); ++k) notes += "<li>" + escaped(warnings[k]) + "</li>";
+    if (warnings.size() > most_notes) notes += fmt::format("<li>and {} more in summary.json</li>", warnings.size() - most_notes);
     if (r.summary.contains("retries") && r.summary["retries"].is_array())
         for (const auto& retry : r.summary["retries"])
             if (retry.is_object())
-                notes += fmt::format(
-                    "<li>went back to t = {} s and on with half the step: {}</li>", shown(at(retry, {"from_time"})),
-                    escaped(retry.contains("message") && retry["message"].is_string() ? retry["message"].get<std::string>() : ""));
+                notes += fmt::format("<li>went back to t = {} s and on with half the step: {}</li>", shown(at(retry, {"from_time"})),
+                                     escaped(word(retry, "message")));
     for (const auto& g : r.gaps) notes += "<li>" + escaped(g) + "</li>";
     return s + section("warnings", "Warnings", notes.empty() ? "<p class=\"soft\">None.</p>\n" : "<ul>" + notes + "</ul>\n");
 }
@@ -197,8 +211,9 @@ std::string pictures(const Record& r)
                                                      : "during";
         const std::string caption = std::isfinite(t) ? fmt::format("{}, t = {:.4g} s", which, t) : which;
         try {
-            s += fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
-                             data_uri("image/png", io::read_text(r.pictures[k])));
+            s += fmt::format(
+                "<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
+                data_uri("image/png", io::read_text(io::hold(r.directory) / r.pictures[k].filename().string(), largest_picture)));
         } catch (const IoFailed& e) {
             s += "<p>" + escaped(e.what()) + "</p>";
         }
@@ -206,7 +221,10 @@ std::string pictures(const Record& r)
     if (!r.movie.empty()) {
         try {
             const bool gif = r.movie.extension() == ".gif", webm = r.movie.extension() == ".webm";
-            const std::string uri = data_uri(gif ? "image/gif" : webm ? "video/webm" : "video/mp4", io::read_text(r.movie));
+            const std::string uri = data_uri(gif    ? "image/gif"
+                                             : webm ? "video/webm"
+                                                    : "video/mp4",
+                                             io::read_text(io::hold(r.directory) / r.movie.filename().string(), largest_movie));
             s += gif ? fmt::format("<figure><img alt=\"animation\" src=\"{}\"><figcaption>all pictures</figcaption></figure>\n", uri)
                      : fmt::format("<figure><video controls loop muted src=\"{}\"></video><figcaption>all pictures</figcaption></figure>\n",
                                    uri);
@@ -259,13 +277,13 @@ std::string phases(const Record& r)
                     (ranks ? "<th>least s</th><th>most s</th>" : "") +
                     "<th>calls</th><th>Gflop/s</th><th>GB/s</th><th>flop/byte</th></tr></thead><tbody>\n";
     const auto row = [&](const std::string& name, const Json& p, const char* kind) {
-        const double share = std::fmax(0, at(p, {"share"})), gflops = at(p, {"gflop_per_second"}), gbytes = at(p, {"gbyte_per_second"}),
-                     intensity = at(p, {"flop_per_byte"});
+        const double share = std::fmin(1, std::fmax(0, at(p, {"share"}))), gflops = at(p, {"gflop_per_second"}),
+                     gbytes = at(p, {"gbyte_per_second"}), intensity = at(p, {"flop_per_byte"});
         const auto or_nothing = [](double v) { return std::isfinite(v) ? shown(v) : std::string(); };
         s += fmt::format("<tr{}><td>{}</td><td>{:.1f} %</td><td class=\"bars\"><span class=\"bar\" style=\"width:{:.1f}%\"></span></td>"
-                         "<td>{:.3f}</td>",
-                         kind, escaped(name), 100 * share, std::min(100 * share, 100.0), at(p, {"seconds", "mean"}));
-        if (ranks) s += fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", at(p, {"seconds", "min"}), at(p, {"seconds", "max"}));
+                         "<td>{}</td>",
+                         kind, escaped(name), 100 * share, std::min(100 * share, 100.0), fixed(at(p, {"seconds", "mean"})));
+        if (ranks) s += fmt::format("<td>{}</td><td>{}</td>", fixed(at(p, {"seconds", "min"})), fixed(at(p, {"seconds", "max"})));
         s += fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                          more(at(p, {"calls"}), 0) ? grouped(at(p, {"calls"})) : std::string(), or_nothing(gflops), or_nothing(gbytes),
                          or_nothing(intensity));
@@ -289,7 +307,8 @@ std::string roofs(const Record& r)
     std::vector<Dot> dots;
     if (r.timers.contains("phases") && r.timers["phases"].is_object())
         for (const auto& [name, p] : r.timers["phases"].items())
-            if (const double x = at(p, {"flop_per_byte"}), y = at(p, {"gflop_per_second"}); more(x, 0) && more(y, 0))
+            if (const double x = at(p, {"flop_per_byte"}), y = at(p, {"gflop_per_second"});
+                more(x, 1e-9) && more(y, 1e-9) && x < 1e9 && y < 1e12)
                 dots.push_back({name, x, y});
     if (dots.empty()) return "<p class=\"soft\">No phase has counted its operations.</p>\n";
     const bool single = r.text("precision") == "mixed";
@@ -297,13 +316,14 @@ std::string roofs(const Record& r)
     const double flops = nodes * at(r.timers, {"machine", single ? "gflops_float_all" : "gflops_double_all"}),
                  bytes = nodes * at(r.timers, {"machine", "gbytes_all"});
     std::optional<Roofs> machine;
-    if (more(flops, 0) && more(bytes, 0)) machine = Roofs{flops, bytes, single ? "multiply-add, single" : "multiply-add, double"};
+    if (more(flops, 1e-6) && more(bytes, 1e-6) && flops < 1e15 && bytes < 1e15)
+        machine = Roofs{flops, bytes, single ? "multiply-add, single" : "multiply-add, double"};
     std::string s = "<div class=\"pair\">\n" + roofline(machine ? &*machine : nullptr, dots) + "<div class=\"small soft\">";
     if (machine)
         s += fmt::format(
             "<p>The roofs were measured on {} ({}): chained fused multiply-adds in registers, and a(i) = b(i) + s c(i) over arrays "
             "larger than the caches, all threads of the run at once.</p>",
-            escaped(r.timers["machine"].value("host", "")), escaped(r.timers["machine"].value("cpu", "")));
+            escaped(word(r.timers["machine"], "host")), escaped(word(r.timers["machine"], "cpu")));
     else
         s += "<p>The roofs of this machine have not been measured yet: <code>kuzure report</code> does it there, in about two seconds, and "
              "keeps "
@@ -337,10 +357,10 @@ std::string effects(const Record& r)
             if (const auto& e = r.summary["effects"]; e.contains(which) && e[which].is_array())
                 for (const auto& effect : e[which])
                     if (effect.is_object()) {
-                        std::string name = effect.value("name", "");
+                        std::string name = word(effect, "name");
                         std::replace(name.begin(), name.end(), '_', ' ');
                         rows += fmt::format("<tr><td><span class=\"tag {0}\">{0}</span> {1}</td><td>{2}</td></tr>\n", which, escaped(name),
-                                            escaped(effect.value("why", "")));
+                                            escaped(word(effect, "why")));
                     }
     if (rows.empty()) return "<p class=\"soft\">Unknown: they stand in summary.json.</p>\n";
     return "<table class=\"text\"><thead><tr><th>effect</th><th>why</th></tr></thead><tbody>\n" + rows + "</tbody></table>\n";

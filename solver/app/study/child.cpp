@@ -29,7 +29,8 @@ ChildResult run_child(const std::vector<std::string>& arguments, const io::Path&
     for (char** e = environ; *e; ++e) {
         const std::string_view v(*e);
         bool ours = false;
-        for (const char* head : {"PMIX_", "PMI_", "PRTE_", "OMPI_COMM_", "OMPI_MCA_ess", "OMPI_MCA_orte", "OMPI_UNIVERSE_", "OMPI_APP_CTX"})
+        for (const char* head :
+             {"KUZURE_MPI=", "PMIX_", "PMI_", "PRTE_", "OMPI_COMM_", "OMPI_MCA_ess", "OMPI_MCA_orte", "OMPI_UNIVERSE_", "OMPI_APP_CTX"})
             ours = ours || v.starts_with(head);
         if (!ours) kept.emplace_back(v);
     }

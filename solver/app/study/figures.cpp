@@ -1,7 +1,8 @@
 // The figures of a study: data and gnuplot scripts, drawn where gnuplot is there.
+#include "io/quote.hpp"
+#include "solver/app/program.hpp"
 #include "solver/app/study/study.hpp"
 #include <algorithm>
-#include <cstdlib>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -11,14 +12,6 @@ namespace {
 using io::Measure;
 
 const char* const colours[] = {"#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#000000"};
-
-/// A string for gnuplot in single quotes, where nothing but the quote itself has a meaning.
-std::string in_quotes(const std::string& text)
-{
-    std::string out = "'";
-    for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
-    return out + "'";
-}
 
 std::string file_of(Measure m)
 {
@@ -57,7 +50,7 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
                 least = std::min(least, 100 * p->error[k]), most = std::max(most, 100 * p->error[k]);
             }
         if (block.empty()) continue;
-        data += fmt::format("# {}: core-seconds, pairs, error in %, spacing in m\n{}\n\n", curve, block);
+        data += fmt::format("# {}: core-seconds, pairs, error in %, spacing in m\n{}\n\n", io::comment_text(curve), block);
         curves.push_back(curve);
     }
     if (curves.empty()) return {};
@@ -75,7 +68,7 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
     std::string c =
         fmt::format("set multiplot layout 1,2 title {}\nset logscale xy\nset format x '10^{{%T}}'\nset bmargin 10\nset ylabel 'error of {} "
                     "(%)'\nset yrange [{:.3g}:{:.3g}]\n",
-                    in_quotes(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
+                    io::gnuplot_string(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
                     0.5 * std::min(least, 1.0), 2 * std::max(most, 5.0));
     const double scatter = 100 * study.sweep.reference.scatter;
     for (const bool pairs : {false, true}) {
@@ -96,7 +89,7 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
                     if (const auto t = cost_at(study.prices(curves[i], m, false), level))
                         title += fmt::format(", {} in {:.3g} s", text, *t);
             add(fmt::format("'{}.dat' index {} u {}:3 w lp lw 2 pt 7 ps 0.8 lc rgb '{}' t {}", name, i, pairs ? 2 : 1, colours[i % 8],
-                            in_quotes(title)));
+                            io::gnuplot_string(title)));
         }
         add(fmt::format("'{}.dat' index 0 u {}:3:(sprintf('%g m', $4)) w labels offset 0,0.8 font ',8' textcolor rgb '#404040' notitle",
                         name, pairs ? 2 : 1));
@@ -119,8 +112,9 @@ std::string choice_figure(const Study& study, const io::Path& folder)
         if (!p.asked.choice || !p.finished() || &p == base) continue;
         const double change = 100 * (p.error[std::size_t(m)] - base->error[std::size_t(m)]);
         const double time = p.core_seconds / base->core_seconds;
-        data +=
-            fmt::format("\"{}\" {:.5g} {:.5g} {:.5g}\n", p.asked.curve, time, p.pairs / base->pairs, std::isfinite(change) ? change : 0.0);
+        std::string name = io::comment_text(p.asked.curve); // in a table of gnuplot, where a double quote ends it
+        std::replace(name.begin(), name.end(), '"', '\'');
+        data += fmt::format("\"{}\" {:.5g} {:.5g} {:.5g}\n", name, time, p.pairs / base->pairs, std::isfinite(change) ? change : 0.0);
         greatest = std::max(greatest, time), largest = std::max(largest, std::fabs(std::isfinite(change) ? change : 0.0)), ++rows;
     }
     if (!rows) return {};
@@ -131,7 +125,7 @@ std::string choice_figure(const Study& study, const io::Path& folder)
         "[0:{:.3g}]\n"
         "set arrow 1 from 1,-0.7 to 1,{} nohead lc rgb '#404040'\n"
         "plot 'choices.dat' u ($2/2):0:($2/2):(0.3):ytic(1) w boxxy lc rgb '#4477aa', '' u 2:0:(sprintf('  %.2f', $2)) w labels left\n",
-        in_quotes(study.sweep.title + ": what each choice costs, against \"base\""), rows - 0.3, 1.25 * greatest, rows - 0.3);
+        io::gnuplot_string(study.sweep.title + ": what each choice costs, against \"base\""), rows - 0.3, 1.25 * greatest, rows - 0.3);
     c += fmt::format("unset arrow 1\nset lmargin at screen 0.67; set rmargin at screen 0.97\nset xlabel 'change of the error of {} "
                      "(percent points)'\nset xrange [{:.3g}:{:.3g}]\n"
                      "set ytics format ''\nset arrow 2 from 0,-0.7 to 0,{} nohead lc rgb '#404040'\n"
@@ -154,14 +148,12 @@ std::string draw(const Study& study, const io::Path& folder)
     if (const auto s = choice_figure(study, folder); !s.empty()) script += s, names.push_back("choices");
     if (names.empty()) return "no figure: no point has an error and a cost";
     io::write_atomically(folder / "figures.gp", script);
-    if (std::system("command -v gnuplot >/dev/null 2>&1") != 0)
+    const auto code = run_program({"gnuplot", "figures.gp"}, folder, "gnuplot.log");
+    if (!code)
         return fmt::format(
             "gnuplot is not installed: data and figures.gp are in {}; install gnuplot-nox and run `gnuplot figures.gp` there",
             folder.string());
-    std::string path;
-    for (const char c : folder.string()) path += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    if (std::system(fmt::format("cd '{}' && gnuplot figures.gp > gnuplot.log 2>&1", path).c_str()) != 0)
-        return fmt::format("gnuplot failed: see {}", (folder / "gnuplot.log").string());
+    if (*code != 0) return fmt::format("gnuplot failed: see {}", (folder / "gnuplot.log").string());
     return fmt::format("figures in {}: {} (png, svg)", folder.string(), fmt::join(names, ", "));
 }
 

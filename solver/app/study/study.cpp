@@ -175,6 +175,8 @@ void measure(const Study& study, Point& p, const io::Path& run)
     p.particles = summary.at("soil_particles"), p.steps = summary.at("steps");
     p.pairs = summary.at("pairs").get<double>(), p.wall_seconds = summary.at("wall_seconds");
     const auto history = report::read_table(io::read_text(run / "history.csv"));
+    const auto& residual = history.at("residual");
+    if (residual.empty()) throw std::out_of_range("history.csv has no rows");
     const auto soil = io::read_snapshot(io::last_snapshot(run));
     p.profile = measure_profile(*p.scene, soil, study.window);
     const auto wants = [&](Measure m) {
@@ -185,7 +187,7 @@ void measure(const Study& study, Point& p, const io::Path& run)
     value(Measure::Runout) = p.profile.runout(study.grain);
     value(Measure::Height) = p.profile.top;
     value(Measure::PeakSpeed) = greatest_speed(run, summary.value("peak_speed", 0.0));
-    value(Measure::Residual) = std::fabs(history.at("residual").back());
+    value(Measure::Residual) = std::fabs(residual.back());
     if (wants(Measure::FailureLine)) p.failure = failure_line(soil, p.spacing, 0.02 * study.grain + 1e-3);
     if (wants(Measure::Stress) || wants(Measure::Settlement)) {
         const AtRest rest = measure_at_rest(*p.scene, soil);
