@@ -85,7 +85,8 @@ template <class A> void describe_soil(A& a, const std::string& path, scene::Soil
              {.fallback = "\"compression\"",
               .example = "\"compression\"",
               .doc = "how the Drucker-Prager cone is fitted to c and phi (docs/theory.md)"});
-    a.choice(path + ".opened_volume", soil.opened_volume, {{"kept", scene::OpenedVolume::Kept}, {"forgotten", scene::OpenedVolume::Forgotten}},
+    a.choice(path + ".opened_volume", soil.opened_volume,
+             {{"kept", scene::OpenedVolume::Kept}, {"forgotten", scene::OpenedVolume::Forgotten}},
              {.fallback = "\"kept\"",
               .example = "\"kept\"",
               .doc = "\"kept\": soil torn open bears no pressure until the opened volume is closed; \"forgotten\": at once, as published"});

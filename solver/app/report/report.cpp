@@ -209,8 +209,9 @@ std::string pictures(const Record& r)
                                                      : "during";
         const std::string caption = std::isfinite(t) ? fmt::format("{}, t = {:.4g} s", which, t) : which;
         try {
-            s += fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
-                             data_uri("image/png", io::read_text(io::hold(r.directory) / r.pictures[k].filename().string(), largest_picture)));
+            s += fmt::format(
+                "<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", escaped(caption),
+                data_uri("image/png", io::read_text(io::hold(r.directory) / r.pictures[k].filename().string(), largest_picture)));
         } catch (const IoFailed& e) {
             s += "<p>" + escaped(e.what()) + "</p>";
         }
