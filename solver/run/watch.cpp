@@ -113,7 +113,8 @@ std::pair<std::string, std::string> Watch::diagnosis(const Clock& clock) const
 void Watch::fail_at(const Particles& p, const Clock& clock, std::int64_t id, const std::string& what, const std::string& remedy)
 {
     failed_id_ = id;
-    std::string text;
+    // Of no particle where it was not one alone: an energy that outgrew the ledger.
+    std::string text = fmt::format("the soil {} in step {}, t = {:.6g} s. Remedy: {}", what, clock.step, clock.time, remedy);
     int root = 0;
     for (Index i = 0; i < p.size(); ++i) {
         if (p[field::id][i] != id) continue;

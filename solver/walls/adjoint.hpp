@@ -40,8 +40,9 @@ template <class V> struct Mirror {
 
 /// Law of Morris et al. (1997) and Bui et al. (2008), eq. 45, point by point: the velocity vanishes on the tangent plane,
 ///     f = 1 + d_B/d_A,  d_B the point's depth, d_A = (x_i - x_j).n - d_B,  at most `cap`.
+/// The cap lies a little above the 2 of a lattice that the surface halves: there f has no kink.
 struct TangentPlane {
-    static constexpr double cap = 2;
+    static constexpr double cap = 2.1;
     template <class V> KUZURE_INLINE V factor(V along, V depth) const
     {
         using T = number<V>;
