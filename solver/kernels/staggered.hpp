@@ -340,7 +340,7 @@ private:
                 const V r2 = dot(r, r);
                 const unsigned hits = bits(less(r2, support2)) & i.owned;
                 if (!hits || wall.first[point] == wall.first[point + 1]) continue;
-                visit(r, max(r2, tiny), hits, mirror(TangentPlane{}, r, &wall.faces[wall.first[point]]));
+                visit(r, max(r2, tiny), hits, mirror(MirrorImage{}, r, &wall.faces[wall.first[point]]));
             }
         }
     }

@@ -338,7 +338,7 @@ Ledger Simulation::ledger(double dt) const
 {
     Ledger l;
     l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), scene_.effects.gravity.value_or(Vector{}), water_,
-                           clock_.energy_unit * 65536, dt);
+                           clock_.energy_unit * 16, dt); // doubles hold 2^11 times the scale exactly
     auto units = over_ranks(comm_, clock_.dissipated);
     for_each_member(l.dissipated, units, [&](double& joules, std::int64_t& u) { joules = double(u) * clock_.energy_unit; });
     return l;

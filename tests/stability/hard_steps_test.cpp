@@ -126,6 +126,7 @@ Impact impact(double alpha, double beta, double mach = 0.3)
     t.walls = box("wall", {-2, 0, -0.08}, {2.4, 0, 0}, "");
     if (alpha > 0) t.effects = fmt::format("viscosity = {{ alpha = {}, beta = {} }}\n", alpha, beta);
     t.effects += weight;
+    t.accuracy += "\ncfl = 0.4"; // the geometry of mid-step is worth 1e-3 of the energy at Mach 0.3 and Courant 1
     Simulation sim(Comm::world(), t.scene());
     Impact r;
     r.outcome = watch(sim, r.energy,
@@ -293,7 +294,7 @@ TEST(H18, MapCoordinates)
         }
         EXPECT_TRUE(c.at_most(fmt::format("dx = {:.6g} m, shifted by 5e6 m: change of displacement over the largest", spacing),
                               worst / largest, "1", 1e-6,
-                              {.note = "positions are kept as 8-byte coordinates of the map, 9.3e-10 m apart at 5e6 m", .achieved = 1e-4}));
+                              {.note = "positions are kept as 8-byte coordinates of the map, 9.3e-10 m apart at 5e6 m", .achieved = 2e-4}));
     }
     // Negative control: single-precision coordinates.
     const double kept = double(float(far + 0.01)) - far;

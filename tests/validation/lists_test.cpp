@@ -57,7 +57,7 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
                 t.walls = box("wall", {0, 0, -4 * d}, {n, n, 0}, "");
                 if (!c.periodic) t.walls += box("wall", {n + 4 * d, 0, 0}, {n + 8 * d, n, n}, "");
                 t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.5, beta = 1.0 }\n";
-                t.accuracy = fmt::format("kernel = \"{}\"\nprecision = \"{}\"\nskin = 0.1\n", kernel, precision);
+                t.accuracy = fmt::format("kernel = \"{}\"\nprecision = \"{}\"\nskin = 0.1\ncfl = 0.4\n", kernel, precision);
                 Simulation sim(Comm::world(), t.scene());
                 const std::string name = fmt::format("{}, {}, {}", c.name, precision, kernel);
                 for (int look = 0; look < 6; ++look) {
