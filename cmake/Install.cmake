@@ -52,8 +52,8 @@ endforeach()
 set(headers include/kuzure-${PROJECT_VERSION})
 install(TARGETS kuzure_flags kuzure_scene kuzure_solver EXPORT kuzure COMPONENT development
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${headers})
-install(DIRECTORY solver/core solver/scene solver/physics solver/neighbours solver/kernels DESTINATION ${headers}/solver
-        COMPONENT development FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY solver/core solver/scene solver/physics solver/neighbours solver/pairs solver/effects solver/walls solver/kernels
+        DESTINATION ${headers}/solver COMPONENT development FILES_MATCHING PATTERN "*.hpp")
 set(config ${CMAKE_INSTALL_LIBDIR}/cmake/kuzure)
 install(EXPORT kuzure FILE kuzureTargets.cmake NAMESPACE kuzure:: DESTINATION ${config} COMPONENT development)
 configure_package_config_file(cmake/kuzureConfig.cmake.in kuzureConfig.cmake INSTALL_DESTINATION ${config})

@@ -71,7 +71,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const double records = double(model.record_bytes());
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
-    const double columns = scene::column_bytes(f) + (s.accuracy.sleep_below > 0 ? 4.0 * double(e.soil) : 0);
+    const double columns = scene::column_bytes(s, f);
     const auto& box = f.soil_bounds();
     const auto across = [&](double low, double high) { return std::floor((high - low) / (2 * s.space.spacing)) + 1; };
     e.columns = across(box.low.x, box.high.x) * (s.dimensions == 3 ? across(box.low.y, box.high.y) : 1);

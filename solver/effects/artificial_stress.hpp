@@ -43,25 +43,6 @@ struct ArtificialStress {
             to.closeness_grad = to.closeness_grad + near_j;
         }
     }
-    /// The same of pairs whose motion it opposes, (v_j - v_i) . (tau_i + tau_j) . x_ij > 0, so that it takes energy and never gives any.
-    /// `tau`: of the lanes.
-    template <class V, class T>
-    KUZURE_INLINE void add_opposing(Sums<V>& to, const Batch<V>& batch, const Tension<T>* tension, const Sym3<V>& tau, bool own) const
-    {
-        const V zero(number<V>(0));
-        for (int k = 0; k < batch.size; ++k) {
-            const Tension<T>& j = tension[batch.neighbour[k]];
-            if (!own && j.any == 0) continue;
-            const Sym3<V> theirs{V(j.xx), V(j.yy), V(j.zz), V(j.xy), V(j.yz), V(j.xz)};
-            const Vec3<V> near_j = closeness(batch.at[k].w) * batch.at[k].grad, push = (tau + theirs) * near_j;
-            const auto opposes = less(dot(batch.at[k].v, push), zero);
-            const auto kept = [&](Vec3<V> a) {
-                return Vec3<V>{select(opposes, a.x, zero), select(opposes, a.y, zero), select(opposes, a.z, zero)};
-            };
-            to.art_stress_j = to.art_stress_j + kept(theirs * near_j);
-            to.closeness_grad = to.closeness_grad + kept(near_j);
-        }
-    }
 };
 struct NoArtificialStress {
     template <class Kernel> static NoArtificialStress from(const scene::Effects&, const Kernel&, double) { return {}; }

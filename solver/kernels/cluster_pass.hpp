@@ -80,8 +80,9 @@ KUZURE_INLINE Elastoplastic<U> cone_of_now(const Elastoplastic<U>& law, std::spa
     return evolved(law, evolution, plastic_strain, shear_rate, trace(sigma) * U(-1.0 / 3));
 }
 
-/// True where a particle of these lanes is outside the box.
-inline bool any_outside(const StepInput& in, const double (&x)[3][16], int n)
+/// True where a particle of these lanes is outside the box. Through memory: GCC 12 would take lanes out of the register by an
+/// instruction that Knights Landing lacks.
+[[gnu::noinline]] inline bool any_outside(const StepInput& in, const double (&x)[3][16], int n)
 {
     for (int k = 0; k < n; ++k)
         if (x[0][k] < in.low->x || x[1][k] < in.low->y || x[2][k] < in.low->z || x[0][k] > in.high->x || x[1][k] > in.high->y ||

@@ -340,7 +340,7 @@ private:
                 const V r2 = dot(r, r);
                 const unsigned hits = bits(less(r2, support2)) & i.owned;
                 if (!hits || wall.first[point] == wall.first[point + 1]) continue;
-                visit(r, max(r2, tiny), hits, mirror(TangentPlane{}, r, &wall.faces[wall.first[point]]));
+                visit(r, max(r2, tiny), hits, mirror(MirrorImage{}, r, &wall.faces[wall.first[point]]));
             }
         }
     }
@@ -474,10 +474,6 @@ private:
         Cluster<V> i = Base::cluster_at(in, cluster, counted_before);
         if (i.moving == 0) return;
         i.position = positions_of<V>(kinematics_.data(), i.first);
-        if constexpr (M::tensile) {
-            const auto v = std::as_const(*in.particles)[field::velocity];
-            i.v = {load_narrow<V>(v.column[0] + i.first), load_narrow<V>(v.column[1] + i.first), load_narrow<V>(v.column[2] + i.first)};
-        }
         const auto pruned = in.lists->pruned(cluster);
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
         ForceSums<Lane> sums;
@@ -502,17 +498,8 @@ private:
         const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
         const V zero(T(0)), one(T(1));
         bool tension = false; // one of the cluster's particles is in tension
-        Sym3<V> tau{};
-        if constexpr (M::tensile) {
-            T rows[6][W];
-            for (int l = 0; l < W; ++l) {
-                const Tension<T>& t = tension_[i.first + std::min(l, i.count - 1)];
-                tension = tension || t.any != 0;
-                const T of[6] = {t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
-                for (int q = 0; q < 6; ++q) rows[q][l] = of[q];
-            }
-            tau = {load<V>(rows[0]), load<V>(rows[1]), load<V>(rows[2]), load<V>(rows[3]), load<V>(rows[4]), load<V>(rows[5])};
-        }
+        if constexpr (M::tensile)
+            for (int l = 0; l < i.count; ++l) tension = tension || tension_[i.first + l].any != 0;
         Batch<V> batch;
         ForceSums<V> sums{};
         V inside = zero;
@@ -530,11 +517,7 @@ private:
                 const V t = max(support - inv.root, zero);
                 const V w = model_.kernel.shape(t, inv.root, inv.inverse_root) * records[number].volume;
                 e.grad = w * r;
-                if constexpr (M::tensile) {
-                    e.w = model_.kernel.value(t);
-                    const Kinematics<T>& j = places[number];
-                    e.v = Vec3<V>{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
-                }
+                if constexpr (M::tensile) e.w = model_.kernel.value(t);
                 if constexpr (M::diffusive) {
                     e.q = w * (r2 / (r2 + softening));
                     const Vector g = model_.stress_diffusion.gravity;
@@ -544,7 +527,7 @@ private:
             // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
             StressForce{}.add(
                 sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
-            if constexpr (M::tensile) model_.artificial_stress.add_opposing(sums, batch, tension_.data(), tau, tension);
+            if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
             if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
         }
         widen<V>(sums, out);

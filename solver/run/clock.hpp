@@ -29,7 +29,7 @@ struct Clock {
 };
 
 /// Length of a step that starts at clock.time, s, 0 when the end time is reached:
-///     dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|) ),  or the scene's fixed step; the last one ends on time.
+///     dt = cfl min( h/(c_p + signal speed), sqrt(h/|a|), staggered: 0.12 h/|v| ),  or the scene's fixed step; the last one ends on time.
 double step_length(const Scene&, const Clock&);
 /// Where a step of this length ends, s.
 double time_after(const Scene&, const Clock&, double dt);

@@ -33,12 +33,14 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         fill_start(comm_, domain_, scene_, filling_, soils_, particles_);
         if (options_.initial) options_.initial(particles_);
         model_->start(particles_);
-        double fastest = 0;
+        double fastest = 0, drift = 0;
         for (Index i = 0; i < particles_.size(); ++i) {
             const Vector v = std::as_const(particles_)[field::velocity][i];
             fastest = std::max(fastest, dot(v, v));
+            const Vector u = v - frame(0);
+            drift = std::max(drift, dot(u, u));
         }
-        clock_.extremes.speed2 = comm_.max(fastest);
+        clock_.extremes.speed2 = comm_.max(fastest), clock_.extremes.drift2 = comm_.max(drift);
         clock_.energy_unit = energy_unit(energy_scale(scene_, filling_, soils_));
         if (options_.initial && clock_.extremes.speed2 > 0) { // particles may have been made faster than the scene says
             double mass = 0;
@@ -49,7 +51,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         clock_.extremes.acceleration2 = dot(g, g);
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
         if (model_->moves_first()) evaluate_start();
-        clock_.energy_at_start = ledger().sum();
+        clock_.energy_at_start = ledger(clock_.next).sum(); // with the half kick to come before it, as at every other time
     });
 }
 
@@ -288,8 +290,11 @@ SleepStage Simulation::sleep_stage() const
 
 void Simulation::count_work(Phase phase, const Stage& stage, std::int64_t pairs, std::size_t clusters)
 {
+    // Pairs are tallied by one stage; every stage walks them.
+    double flops = 0;
+    for (const Stage& s : model_->stages()) flops += s.flops_per_pair;
     const double particles = double(clusters) / std::max<double>(1, double(layout_.lists().size())) * particles_.size();
-    timers_.did(phase, double(pairs) * stage.flops_per_pair + particles * stage.flops_per_particle, particles * stage.bytes_per_particle);
+    timers_.did(phase, double(pairs) * flops + particles * stage.flops_per_particle, particles * stage.bytes_per_particle);
 }
 
 // ---- guard and retry -----------------------------------------------------------------------------------------------
@@ -329,11 +334,11 @@ bool Simulation::roll_back()
 
 // ---- what a run tells of itself ------------------------------------------------------------------------------------
 
-Ledger Simulation::ledger() const
+Ledger Simulation::ledger(double dt) const
 {
     Ledger l;
     l.state = state_energy(comm_, particles_, soils_, scene_.particle_volume(), scene_.effects.gravity.value_or(Vector{}), water_,
-                           clock_.energy_unit * 65536, clock_.dt);
+                           clock_.energy_unit * 16, dt); // doubles hold 2^11 times the scale exactly
     auto units = over_ranks(comm_, clock_.dissipated);
     for_each_member(l.dissipated, units, [&](double& joules, std::int64_t& u) { joules = double(u) * clock_.energy_unit; });
     return l;

@@ -60,7 +60,7 @@ public:
     std::int64_t failed_id() const { return watch_.failed_id(); }
 
     /// Collective: energies of now.
-    Ledger ledger() const;
+    Ledger ledger() const { return ledger(clock_.dt); }
     /// (sum of energies - that at the start)/(potential drop).
     double residual(const Ledger&) const;
     /// Collective: the clock with everything that other ranks know summed up on every rank.
@@ -81,6 +81,8 @@ public:
 
 private:
     Simulation(const Comm&, const Scene&, RunOptions, const Clock&);
+    /// Of a state that a step of this length led to, s.
+    Ledger ledger(double dt) const;
     void prepare();
     void rebuild(bool sort_anew, double way = 0);
     StepInput step_input(double dt, double next);

@@ -43,25 +43,25 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
 
 double energy_scale(const Scene& scene, const scene::Filling& filling, std::span<const Material> soils)
 {
-    // Soil may fall as far as the whole scene reaches, and where there is no floor for all of the run's time.
+    // Soil may fall as far as the whole scene reaches; beyond its walls energy_unit() leaves room.
     scene::Box b = filling.soil_bounds();
     for (const auto& wall : scene.walls) {
         const scene::Box w = scene::bounds(wall.shape);
         b.low = {std::min(b.low.x, w.low.x), b.low.y, std::min(b.low.z, w.low.z)};
         b.high = {std::max(b.high.x, w.high.x), b.high.y, std::max(b.high.z, w.high.z)};
     }
-    const double g = length(scene.effects.gravity.value_or(Vector{})), fall = 0.5 * g * scene.time.end * scene.time.end;
+    const double g = length(scene.effects.gravity.value_or(Vector{}));
     double scale = 0;
     for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
         const auto& body = scene.bodies[k];
         const Material& m = soils[body.soil];
         const double mass = m.density * scene.particle_volume() * double(filling.body_count(int(k)));
-        const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing}) + fall;
+        const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing});
         scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.sound_speed * m.sound_speed);
     }
     return scale;
 }
 
-double energy_unit(double scale) { return std::exp2(std::floor(std::log2(scale)) - 58); }
+double energy_unit(double scale) { return std::exp2(std::floor(std::log2(scale))) / energy_units_per_scale; }
 
 } // namespace kuzure

@@ -12,7 +12,8 @@ void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::
 
 /// Energy scale of a whole run, J: weight times height, or kinetic energy, or a little strain.
 double energy_scale(const Scene&, const scene::Filling&, std::span<const Material>);
-/// The unit that energies of this scale (J) are sums of: a power of two, 2^-58 of it or less.
+/// The unit that energies of this scale (J) are sums of, a power of two: 64-bit sums hold 2^17 times the scale, however far soil may fall.
+inline constexpr double energy_units_per_scale = 0x1p46;
 double energy_unit(double scale);
 
 } // namespace kuzure

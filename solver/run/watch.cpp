@@ -1,4 +1,5 @@
 #include "solver/run/watch.hpp"
+#include "solver/run/start.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
@@ -113,7 +114,8 @@ std::pair<std::string, std::string> Watch::diagnosis(const Clock& clock) const
 void Watch::fail_at(const Particles& p, const Clock& clock, std::int64_t id, const std::string& what, const std::string& remedy)
 {
     failed_id_ = id;
-    std::string text;
+    // Of no particle where it was not one alone: an energy that outgrew the ledger.
+    std::string text = fmt::format("the soil {} in step {}, t = {:.6g} s. Remedy: {}", what, clock.step, clock.time, remedy);
     int root = 0;
     for (Index i = 0; i < p.size(); ++i) {
         if (p[field::id][i] != id) continue;
@@ -158,7 +160,8 @@ void Watch::judge_step(const Particles& p, const Clock& clock)
 void Watch::judge_ledger(const Particles& p, Clock& clock, const Ledger& l)
 {
     clock.largest_energy = std::max(clock.largest_energy, l.state.kinetic + l.state.elastic + std::max(-l.state.potential, 0.0));
-    const double allowed = limit::given * clock.largest_energy;
+    // Against a thousandth of weight times height at least, so that the first movement is not judged by itself.
+    const double allowed = limit::given * std::max(clock.largest_energy, 1e-3 * energy_units_per_scale * clock.energy_unit);
     const auto [why, remedy] = diagnosis(clock);
     if (-l.dissipated.wall > allowed) {
         const auto id = fastest(p);
@@ -195,7 +198,7 @@ void Watch::inspect(const Particles& p, const Layout& layout, Clock& clock, cons
 {
     judge_ledger(p, clock, l);
     // Against a thousandth of weight times height at least, so that the first movement is not judged by itself.
-    const double energy_scale = std::exp2(58) * clock.energy_unit;
+    const double energy_scale = energy_units_per_scale * clock.energy_unit;
     const double scale =
         std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock.energy_at_start), 1e-3 * energy_scale});
     const double grown = (l.sum() - clock.energy_at_start) / scale;

@@ -687,13 +687,24 @@ double excess_of_mass(const Scene& scene, const Filling& filling, int body)
     return held / volume(scene.bodies[std::size_t(body)].shape, scene.dimensions) - 1;
 }
 
-double column_bytes(const Filling& filling)
+double column_bytes(const Scene& scene, const Filling& filling)
 {
-    double bytes = 0;
-    const auto add = [&]<class F>(F) {
-        if (!std::is_same_v<F, field::Activity>) bytes += double(sizeof(typename F::Number)) * F::components; // only where soil may sleep
+    const bool leap_frog = scene.accuracy.scheme == Scheme::LeapFrog;
+    const bool coulomb = std::ranges::any_of(scene.walls, [](const Wall& w) { return w.surface == Surface::Coulomb; });
+    const bool remembers = std::ranges::any_of(scene.soils, [](const Soil& s) { return s.opened_volume == OpenedVolume::Kept; });
+    const auto carried = [&]<class F>(F) {
+        const auto is = [](auto... f) { return (std::is_same_v<F, std::remove_const_t<decltype(f)>> || ...); };
+        if (is(field::half_velocity, field::half_density, field::half_stress)) return leap_frog;
+        if (is(field::acceleration)) return !leap_frog;
+        if (is(field::stress_rate)) return !leap_frog && scene.effects.stress_diffusion.has_value();
+        if (is(field::wall_slip, field::wall_pressure)) return !leap_frog && coulomb;
+        if (is(field::opened_volume)) return remembers;
+        if (is(field::activity)) return scene.accuracy.sleep_below > 0;
+        return true;
     };
-    std::apply([&](auto... f) { (add(f), ...); }, AllFields{});
+    double bytes = 0;
+    std::apply([&](auto... f) { ((bytes += carried(f) ? double(sizeof(typename decltype(f)::Number)) * f.components : 0), ...); },
+               AllFields{});
     return bytes * double(filling.soil_count());
 }
 

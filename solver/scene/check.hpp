@@ -46,6 +46,6 @@ double excess_of_mass(const Scene&, const Filling&, int body);
 inline constexpr double most_excess = 0.02;
 
 /// Bytes of the columns of all soil particles of a run: the fields of the store, without records and lists.
-double column_bytes(const Filling&);
+double column_bytes(const Scene&, const Filling&);
 
 } // namespace kuzure::scene

@@ -38,16 +38,11 @@ template <class V> struct Mirror {
     V stick, coulomb, tangent;
 };
 
-/// Law of Morris et al. (1997) and Bui et al. (2008), eq. 45, point by point: the velocity vanishes on the tangent plane,
-///     f = 1 + d_B/d_A,  d_B the point's depth, d_A = (x_i - x_j).n - d_B,  at most `cap`.
-struct TangentPlane {
-    static constexpr double cap = 2;
-    template <class V> KUZURE_INLINE V factor(V along, V depth) const
-    {
-        using T = number<V>;
-        const V front = max(along - depth, V(T(1e-9)));
-        return min(max(along / front, V(T(1))), V(T(cap)));
-    }
+/// Law: a wall point moves as the particle's mirror image, v_j = -v_i of what is mirrored, f = 2. Summed over the particles on one side and
+/// the points on the other this is the linear profile of Morris et al. (1997), f = 1 + d_B/d_A, for each pair of distances counts twice,
+/// once either way; unlike that it has no singularity, needs no cap, and holds a uniform stress in equilibrium particle by particle.
+struct MirrorImage {
+    template <class V> KUZURE_INLINE V factor(V, V) const { return V(number<V>(2)); }
 };
 
 /// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.

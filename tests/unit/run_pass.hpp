@@ -66,8 +66,8 @@ public:
         std::vector<Group> groups;
         for (Index c = 0; c < cloud_.lists.size(); ++c) {
             const PassResult r = model_->run(0, in, std::array{c});
-            groups.push_back({cloud_.lists.first(c), cloud_.lists.count(c), r.pairs, r.energy.wall / seconds, r.energy.viscous / seconds,
-                              r.energy.damping / seconds});
+            groups.push_back({cloud_.lists.first(c), cloud_.lists.count(c), r.pairs, r.energy.wall / seconds,
+                              (r.energy.viscous + r.energy.stabilising) / seconds, r.energy.damping / seconds});
         }
         return groups;
     }

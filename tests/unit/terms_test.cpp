@@ -1,4 +1,5 @@
-// Artificial stress from principal stresses (effects/artificial_stress.cpp): against stresses whose axes are known, and where rotations end in nothing.
+// Artificial stress from principal stresses (effects/artificial_stress.cpp): against stresses whose axes are known, and where rotations end
+// in nothing.
 #include "solver/effects/artificial_stress.hpp"
 #include <cfenv>
 #include <cmath>

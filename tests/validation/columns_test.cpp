@@ -72,7 +72,7 @@ struct Sheared {
 Sheared shear(int spacings, bool smooth_wall)
 {
     SceneText t;
-    t.spacing = 1.0 / spacings, t.h = 2.2, t.accuracy = "kernel = \"wendland c2\"";
+    t.spacing = 1.0 / spacings, t.h = 2.2, t.accuracy = "kernel = \"wendland c2\"\nskin = 0.1";
     t.young = 5e6, t.density = 2100;
     const double width = 10 * t.spacing, thick = 5 * t.spacing, V = 1e-3;
     // Walls do not move. The plate is soil a million times as dense, whose layers go on at V z/H, as dummy particles of a moving

@@ -22,7 +22,7 @@ SceneText struck_ground(double sleep_below)
                box("body", {0.9, 0, 0.6}, {1.1, 0, 0.8}, "soil = \"s\"");
     t.walls = box("wall", {0, 0, -0.08}, {2, 0, 0}, "");
     t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.1 }\n";
-    t.accuracy = fmt::format("kernel = \"cubic spline\"\nsleep_below = {}\n", sleep_below);
+    t.accuracy = fmt::format("kernel = \"cubic spline\"\ncfl = 0.2\nsleep_below = {}\n", sleep_below);
     t.end = 0.5;
     return t;
 }
