@@ -641,7 +641,10 @@ private:
         const U speed = lane_by_lane<U>([&](int k) { return material(k).rod_speed; });
         const U K0 = lane_by_lane<U>([&](int k) { return material(k).at_rest; });
         const U strength = U(2 * model_.stress_diffusion.zeta * h_ * scale_ / unit_) * speed;
-        p[field::stress_rate].store(lanes.at, model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_)), lanes.n);
+        const auto kept = p[field::stress_rate];
+        Sym3<U> rate = model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));
+        if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
+        kept.store(lanes.at, rate, lanes.n);
     }
     /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
     KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const
