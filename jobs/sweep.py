@@ -16,7 +16,7 @@ BATCH = {"slurm": "sbatch", "pjsub": "pjsub", "none": "bash"}
 
 # What a core's time goes to, by the phases of timers.json. What is not named (other) is kernel's: the step's own small work.
 GROUPS = {
-    "kernel": ["interior pairs", "rim pairs", "walls", "effects", "update", "time step", "guard", "other"],
+    "kernel": ["interior pairs", "rim pairs", "move", "guard", "other"],
     "lists": ["sort", "lists"],
     "imbalance": [],  # taken out of the waits below: what the slowest rank computes longer than the mean
     "halo": ["begin halo", "wait for halo", "ghosts"],
@@ -25,7 +25,7 @@ GROUPS = {
     "reductions": ["reduce"],
     "I/O": ["snapshot", "history", "checkpoint", "picture"],
 }
-COMPUTES = ["interior pairs", "rim pairs", "walls", "effects", "update"]
+COMPUTES = ["interior pairs", "rim pairs", "move"]
 COLOURS = ["#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#888888"]
 
 

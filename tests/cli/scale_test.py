@@ -47,6 +47,7 @@ gravity = [0.0, 0.0, -9.81]
 viscosity = {{ alpha = 0.1, beta = 0.0 }}
 artificial_stress = "auto"
 [accuracy]
+scheme = "leap-frog"
 precision = "{precision}"
 """
 CUBE = """title = "a cube on a floor, and a wall beside it"

@@ -73,7 +73,7 @@ try:
     legs, before = 0, -1
     while legs < 60 and not failures:
         legs += 1
-        process = start("legs", "--max-minutes", "0.006")
+        process = start("legs", "--max-minutes", "0.002")
         out, err = process.communicate(timeout=120)
         if process.returncode == 0:
             break

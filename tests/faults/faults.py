@@ -173,7 +173,7 @@ def snapshots(path):
         with h5py.File(os.path.join(path, "snapshots", entry["name"])) as f:
             data = f["VTKHDF/PointData"]
             order = np.argsort(data["id"][:])
-            rows.append((entry["time"], f["VTKHDF/Points"][:][order].tobytes(), data["stress"][:][order].tobytes()))
+            rows.append((entry["time"], f["VTKHDF/Points"][:][order].tobytes(), *(data[k][:][order].tobytes() for k in sorted(data))))
     return rows
 
 
