@@ -113,7 +113,7 @@ class Run:
 
     def snapshot_files(self):
         folder = os.path.join(self.dir, "snapshots")
-        return sorted(os.path.join(folder, f) for f in os.listdir(folder) if f.endswith(".hdf"))
+        return sorted(os.path.join(folder, f) for f in os.listdir(folder) if f.startswith("state_") and f.endswith(".hdf"))
 
     def snapshot(self, number=-1):
         """Soil particles of a snapshot, ordered by id."""
