@@ -9,8 +9,8 @@ namespace kuzure {
 
 /// What the walls add to the sums of a cluster, one number a lane.
 template <int W> struct WallShare {
-    double walled[W] = {}; // 1 for a particle that feels a wall
-    double power[W] = {};  // taken by the walls, per unit of rho_i V_i/m_i
+    double walled[row_length<W>] = {}; // 1 for a particle that feels a wall
+    double power[row_length<W>] = {};  // taken by the walls, per unit of rho_i V_i/m_i
 };
 
 template <class M, class V> class LeapFrog final : public ClusterPass<M, V> {

@@ -6,9 +6,12 @@
 
 namespace kuzure {
 
+/// Doubles that a row of W lanes holds: whole registers of the update, which reads beyond the lanes of a narrow cluster.
+template <int W> inline constexpr int row_length = W == 1 || W > width<Native<double>> ? W : width<Native<double>>;
+
 /// One sum of each of W particles.
-template <int W> struct alignas(8 * W < 64 ? 8 * W : 64) Row {
-    double at[W];
+template <int W> struct alignas(8 * row_length<W> < 64 ? 8 * row_length<W> : 64) Row {
+    double at[row_length<W>];
 };
 
 /// The sums of several terms, one member after the other.
