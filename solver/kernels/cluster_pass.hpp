@@ -186,6 +186,23 @@ protected:
             update(Lanes{i.first + first, first, std::min(width<U>, i.count - first), i.moving});
     }
 
+    /// Who is calm, or falls asleep, by what a lane will have moved with until the next detection; `awake`: lanes with an awake neighbour.
+    KUZURE_INLINE static void detect_calm(const StepInput& in, const Lanes& lanes, Vec3<U> a, Vec3<U> v, unsigned awake)
+    {
+        const auto activity = (*in.particles)[field::activity];
+        double soon[width<U>];
+        store(soon, fma(U(in.detection_interval), sqrt(dot(a, a)), sqrt(dot(v, v))));
+#pragma GCC unroll 1
+        for (int k = 0; k < lanes.n; ++k) {
+            const bool calm = soon[k] < in.calm_speed, alone = (awake >> (lanes.first + k) & 1) == 0;
+            const auto now = !calm                            ? Activity::Moves
+                             : in.sleep == SleepStage::Detect ? Activity::Calm
+                             : alone                          ? Activity::Asleep
+                                                              : Activity::Moves;
+            activity.set(lanes.at + k, std::int32_t(now));
+        }
+    }
+
     double unit_;
     int dimensions_;
     double h_, volume_; // m, m^3 (m^2 in 2-D) of one particle at reference density

@@ -1,6 +1,7 @@
 #pragma once
 // Bui's leap-frog (2008): one pass a step. Half-step values advance by a whole kick; values at the step's end are predicted from
-// them with half a step of the rates. With velocity and stress from one pass this is Adams-Bashforth 2.
+// them with half a step of the rates. With velocity and stress from one pass this is Adams-Bashforth 2. One file beyond 400 lines: it
+// is one pass, the published method, and does not grow.
 #include "solver/kernels/cluster_pass.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/walls/mirrored.hpp"
@@ -337,7 +338,7 @@ private:
         if (in.sleep == SleepStage::Frozen) keep_sleepers(in, lanes, mine, now, next);
         write_state(in, lanes, next);
         write_records(lanes, soil, next);
-        if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) detect_calm(in, lanes, rate.a, next.v, awake);
+        if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) detect(in, lanes, rate.a, next.v, awake);
         report(in, sums, share, lanes, mine, now, rate, soil, next, tally);
     }
 
@@ -464,21 +465,11 @@ private:
                     Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]}, model_.artificial_stress.epsilon);
         }
     }
-    KUZURE_INLINE void detect_calm(const StepInput& in, const Lanes& lanes, Vec3<U> a, Vec3<U> v, unsigned awake)
+    KUZURE_INLINE void detect(const StepInput& in, const Lanes& lanes, Vec3<U> a, Vec3<U> v, unsigned awake)
     {
-        const auto activity = (*in.particles)[field::activity];
-        double soon[width<U>];
-        store(soon, fma(U(in.detection_interval), sqrt(dot(a, a)), sqrt(dot(v, v))));
-#pragma GCC unroll 1
-        for (int k = 0; k < lanes.n; ++k) {
-            const bool calm = soon[k] < in.calm_speed, alone = (awake >> (lanes.first + k) & 1) == 0;
-            const auto now = !calm                            ? Activity::Moves
-                             : in.sleep == SleepStage::Detect ? Activity::Calm
-                             : alone                          ? Activity::Asleep
-                                                              : Activity::Moves;
-            activity.set(lanes.at + k, std::int32_t(now));
-            next_[lanes.at + k].awake = T(calm ? 0 : 1);
-        }
+        Base::detect_calm(in, lanes, a, v, awake);
+        const auto activity = std::as_const(*in.particles)[field::activity];
+        for (int k = 0; k < lanes.n; ++k) next_[lanes.at + k].awake = T(activity[lanes.at + k] == std::int32_t(Activity::Moves));
     }
     /// Energies, exact sums of rounded addends, and maxima; both over the lanes that moved.
     template <class Mine>

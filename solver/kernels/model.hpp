@@ -4,14 +4,18 @@
 #include "solver/effects/gradient_correction.hpp"
 #include "solver/effects/stress_diffusion.hpp"
 #include "solver/effects/viscosity.hpp"
+#include "solver/pairs/sums.hpp"
 #include "solver/physics/smoothing.hpp"
 #include <string>
+#include <tuple>
 
 namespace kuzure {
 
-/// Kernel and terms with lengths in units of `unit` metres (1, or h in mixed precision).
+/// Kernel and terms with lengths in units of `unit` metres (1, or h in mixed precision). More: further pair forces of the staggered
+/// scheme. Each has its Sums<V>, flops, from(interactions, unit), add(sums, batch, stresses of neighbours) and force(sums), which is
+/// rho_i dv_i/dt without the kernel's constant, Pa/m; what it does to the energy is booked as stabilising.
 template <class KernelType, class Viscous, class Tensile = NoArtificialStress, class Diffusive = NoStressDiffusion,
-          class Corrected = NoCorrection>
+          class Corrected = NoCorrection, class... More>
 struct Model {
     using Kernel = KernelType;
     using ArtificialStressTerm = Tensile;
@@ -21,12 +25,16 @@ struct Model {
     static constexpr bool tensile = std::is_same_v<Tensile, ArtificialStress>;
     static constexpr bool diffusive = std::is_same_v<Diffusive, StressDiffusion>;
     static constexpr bool corrected = std::is_same_v<Corrected, GradientCorrection>;
+    static constexpr bool pushes = tensile || sizeof...(More) > 0;
+    static constexpr double more_flops = (0.0 + ... + More::flops);
+    template <class S, class... Terms> using WithMore = SumsOf<S, Terms..., More...>;
     Kernel kernel;
     Viscous viscosity;
     Tensile artificial_stress;
     Diffusive stress_diffusion;
     Corrected correction;
     bool correct; // a model with the correction compiled in also serves scenes without
+    std::tuple<More...> more;
 
     static Model from(const scene::Interactions& s, double unit)
     {
@@ -36,7 +44,8 @@ struct Model {
                 Tensile::from(s.effects, kernel, s.spacing / unit),
                 Diffusive::from(s.effects),
                 {},
-                s.correction == scene::Correction::Gradient};
+                s.correction == scene::Correction::Gradient,
+                {More::from(s, unit)...}};
     }
     static bool covers(const scene::Interactions& s)
     {

@@ -1,0 +1,280 @@
+#pragma once
+// The force stage of the staggered scheme: forces of stresses, artificial stress and walls, with the viscous force of the strain stage
+// the acceleration of t^(n+1), and with it the velocity.
+#include "solver/kernels/staggered_records.hpp"
+#include "solver/walls/friction.hpp"
+
+namespace kuzure {
+
+template <class Below> class ForceStage : public Below {
+    using M = typename Below::Model;
+    using V = typename Below::LaneType;
+
+protected:
+    using Below::W, Below::unit_, Below::h_, Below::volume_, Below::model_, Below::scale_, Below::water_, Below::kinematics_,
+        Below::stresses_, Below::tension_;
+    using typename Below::T, typename Below::U;
+
+    /// What walls add to the sums of a cluster; over wall points j of volume 1, f_ij the mirror factor.
+    struct WallForce {
+        template <class S> struct Sums {
+            Vec3<S> held, pressing; // sum f P (sigma_i grad W); of Coulomb faces apart
+            S limit;                // sum f tan(delta) n.(sigma_i grad W)
+            S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
+            S area;                 // sum f n.grad W of Coulomb faces
+        };
+    };
+    template <class S>
+    using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
+    template <class S> using ForceWalls = WallForce::template Sums<S>;
+    using Lane = Row<W>;
+
+    explicit ForceStage(const scene::Interactions& s) : Below(s) {}
+
+    /// Geometry: r 3, r.r 5, reciprocal 1, length 1, t 2, shape and volume 8, grad W 3. Update: 60.
+    static Stage force_stage()
+    {
+        return {"force", sizeof(Stresses<T>) + (M::tensile ? sizeof(Tension<T>) : 0),
+                23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops + M::more_flops, 60,
+                25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
+    }
+    PassResult run_force(const StepInput& in, std::span<const Index> clusters)
+    {
+        return Below::over(
+            clusters, [&](Index c, Tally<U> & tally) __attribute__((always_inline)) { force_cluster(in, c, tally); });
+    }
+
+private:
+    KUZURE_INLINE void force_cluster(const StepInput& in, Index cluster, Tally<U>& tally)
+    {
+        Tally<U> counted_before; // sleepers are counted in stage 0
+        Cluster<V> i = Below::cluster_at(in, cluster, counted_before);
+        if (i.moving == 0) return;
+        i.position = positions_of<V>(kinematics_.data(), i.first);
+        const auto pruned = in.lists->pruned(cluster);
+        const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
+        ForceSums<Lane> sums;
+        // every particle meets itself once in its list
+        tally.pairs += sum_forces(i, near, sums) - std::popcount(i.moving);
+        unsigned awake = 0;
+        if (in.sleep == SleepStage::Freeze) awake = awake_near(i, near, kinematics_.data(), stresses_.data(), 2 * model_.kernel.h);
+        ForceWalls<Lane> walls{};
+        const auto runs = in.lists->walls(cluster);
+        if (!runs.empty()) tally.pairs += sum_wall_forces(in, i, runs, walls);
+        Below::for_each_register(
+            i, [&](const Lanes& lanes)
+                   __attribute__((always_inline)) { update_force(in, sums, walls, !runs.empty(), lanes, awake, tally); });
+    }
+
+    /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
+    KUZURE_INLINE std::int64_t sum_forces(const Cluster<V>& i, std::span<const Index> near, ForceSums<Lane>& out) const
+    {
+        const Kinematics<T>* places = kinematics_.data();
+        const Stresses<T>* records = stresses_.data();
+        const V support(T(2 * model_.kernel.h)), support2(T(4 * model_.kernel.h * model_.kernel.h));
+        const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
+        const V zero(T(0)), one(T(1));
+        bool tension = false; // one of the cluster's particles is in tension
+        if constexpr (M::tensile)
+            for (int l = 0; l < i.count; ++l) tension = tension || tension_[i.first + l].any != 0;
+        Batch<V> batch;
+        ForceSums<V> sums{};
+        V inside = zero;
+        const int n = int(near.size());
+        for (int b = 0; b < n; b += batch.capacity) {
+            batch.neighbour = &near[b];
+            batch.size = std::min(batch.capacity, n - b);
+            for (int k = 0; k < batch.size; ++k) {
+                const Index number = batch.neighbour[k];
+                Entry<V>& e = batch.at[k];
+                const Vec3<V> r = i.position.minus(places[number]);
+                const V r2 = max(dot(r, r), tiny);
+                inside = inside + select(less(r2, support2), one, zero);
+                const auto inv = root<M::Kernel::divides>(r2);
+                const V t = max(support - inv.root, zero);
+                const V w = model_.kernel.shape(t, inv.root, inv.inverse_root) * records[number].volume;
+                e.grad = w * r;
+                if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                if constexpr (M::diffusive) {
+                    e.q = w * (r2 / (r2 + softening));
+                    const Vector g = model_.stress_diffusion.gravity;
+                    e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+                }
+            }
+            // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
+            StressForce{}.add(
+                sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
+            if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+            if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
+            std::apply([&](const auto&... term) { (term.add(sums, batch, records), ...); }, model_.more);
+        }
+        widen<V>(sums, out);
+        return Below::counted(i, inside);
+    }
+
+    /// Returns the wall pairs inside the support.
+    [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
+                                                   ForceWalls<Lane>& out) const
+    {
+        const auto& p = std::as_const(*in.particles);
+        const auto s = p[field::stress];
+        const auto v = p[field::velocity];
+        const auto narrow = [&](const double* column) { return load_narrow<V>(column + i.first); };
+        const Sym3<V> sigma{narrow(s.column[0]), narrow(s.column[1]), narrow(s.column[2]),
+                            narrow(s.column[3]), narrow(s.column[4]), narrow(s.column[5])};
+        const Vec3<V> velocity{narrow(v.column[0]), narrow(v.column[1]), narrow(v.column[2])};
+        ForceWalls<V> sums{};
+        std::int64_t pairs = 0;
+        const V none(T(0));
+        Below::for_each_wall_pair(i, runs, {none, none, none}, [&](Vec3<V> r, V r2, unsigned hits, const Mirror<V>& m) {
+            pairs += std::popcount(hits & i.moving);
+            const V support(T(2 * model_.kernel.h)), zero(T(0));
+            const auto inv = root<M::Kernel::divides>(r2);
+            const Vec3<V> g = (m.factor * model_.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root)) * r;
+            const Vec3<V> traction = sigma * g;
+            const Vec3<V> crossing = project(m, traction);
+            const V slides = m.coulomb, holds = V(T(1)) - slides;
+            sums.held = fma(holds, crossing, sums.held), sums.pressing = fma(slides, crossing, sums.pressing);
+            const V along = dot(traction, m.normal), facing = slides * dot(g, m.normal);
+            sums.limit = fma(slides * m.tangent, along, sums.limit);
+            sums.approach = fma(facing, dot(velocity, m.normal), sums.approach);
+            sums.area = sums.area + facing;
+        });
+        widen<V>(sums, out);
+        return pairs;
+    }
+
+    KUZURE_INLINE void update_force(const StepInput& in, const ForceSums<Lane>& rows, const ForceWalls<Lane>& wall_rows, bool walled,
+                                    const Lanes& lanes, unsigned awake, Tally<U>& tally)
+    {
+        auto& p = *in.particles;
+        const auto& was = std::as_const(p);
+        const U zero(0.0), half(0.5), factor(scale_), dt(in.dt), next(in.next), half_dt = half * dt, half_next = half * next;
+        const auto sums = lanes_at<U, ForceSums<U>, ForceSums<Lane>, W>(rows, lanes.first);
+        const LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
+        const Sym3<U> sigma = was[field::stress].template load<U>(lanes.at);
+        const U rho = was[field::density].template load<U>(lanes.at);
+        const Vec3<U> x = was[field::position].template load<U>(lanes.at), u = was[field::velocity].template load<U>(lanes.at);
+        const Vec3<U> viscous = was[field::acceleration].template load<U>(lanes.at);
+        const U per_rho = factor / rho;
+
+        const Vec3<U> stress = per_rho * (sums.force + sigma * sums.grad_one);
+        Vec3<U> pushed{zero, zero, zero}, wall = pushed;
+        if constexpr (M::tensile) {
+            const auto tau = lane_by_lane<Sym3, U>([&](int k) {
+                const Tension<T>& t = tension_[lanes.particle(k)];
+                return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
+            });
+            pushed = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
+        }
+        std::apply([&](const auto&... term) { ((pushed = pushed + per_rho * term.force(sums)), ...); }, model_.more);
+        if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
+        if (walled) wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho);
+        const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
+        Vec3<U> a = ((stress + viscous) + (pushed + wall)) + body;
+        // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)
+        const U mu(in.forces.damping), kick = half_dt + half_next;
+        a = (U(1.0) / fma(half * mu, kick, U(1.0))) * (a - mu * u);
+        Vec3<U> v = fma(half_dt, a, u);
+        const auto mine = written<U>(lanes);
+        if (in.sleep == SleepStage::Frozen) v = select(mine, v, u), a = select(mine, a, viscous); // a sleeper's holds its acceleration
+        p[field::velocity].store(lanes.at, v, lanes.n);
+        p[field::acceleration].store(lanes.at, a, lanes.n);
+        if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) Below::detect_calm(in, lanes, a, v, awake);
+
+        tell(in, lanes, Moved{x, u, v, a}, Forces{viscous, pushed, wall}, U(volume_) * soil.rho0, walled, tally);
+    }
+    struct Moved { // after the step: place, velocity half a step before, velocity, acceleration
+        Vec3<U> x, u, v, a;
+    };
+    struct Forces { // per unit of mass, m/s^2
+        Vec3<U> viscous, pushed, wall;
+    };
+    /// Work of each force, half of the step before and half of the one to come; exact sums of rounded addends. Maxima; displacement and
+    /// drift are those of the step to come.
+    KUZURE_INLINE void tell(const StepInput& in, const Lanes& lanes, const Moved& m, const Forces& f, U mass, bool walled,
+                            Tally<U>& tally) const
+    {
+        const auto& p = std::as_const(*in.particles);
+        const U zero(0.0), half(0.5), half_dt = half * U(in.dt), next(in.next), half_next = half * next, mu(in.forces.damping);
+        const U magic(magic_of(in.energy_unit));
+        const auto mine = written<U>(lanes);
+        const Vec3<U> coming = fma(half_next, m.a, m.v);
+        const auto take = [&](U& before, U& later, Vec3<U> force) {
+            before -= select(mine, quantized(mass * (half_dt * dot(force, m.u)), magic), zero);
+            later -= select(mine, quantized(mass * (half_next * dot(force, coming)), magic), zero);
+        };
+        take(tally.energy.viscous, tally.later.viscous, f.viscous);
+        if constexpr (M::pushes) take(tally.energy.stabilising, tally.later.stabilising, f.pushed);
+        if (walled) take(tally.energy.wall, tally.later.wall, f.wall);
+        if (in.forces.damping > 0) take(tally.energy.damping, tally.later.damping, -(half * mu) * (m.u + coming));
+        const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
+        const Vec3<U> moved = (fma(next, coming, m.x) - p[field::sorted_position].template load<U>(lanes.at)) - flown,
+                      drift = coming - frame;
+        const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
+        meet(tally.maxima.acceleration2, dot(m.a, m.a));
+        meet(tally.maxima.displacement2, dot(moved, moved));
+        meet(tally.maxima.speed2, dot(m.v, m.v));
+        meet(tally.maxima.drift2, dot(drift, drift));
+        tally.poison += select(mine, fma(zero, dot(m.a, m.a), fma(zero, dot(m.v, m.v), zero * dot(m.x, m.x))), zero);
+        if (in.low) {
+            double at[3][16];
+            store(at[0], m.x.x), store(at[1], m.x.y), store(at[2], m.x.z);
+            if (any_outside(in, at, lanes.n)) tally.maxima.outside = U(1.0);
+        }
+    }
+    /// Stress rate of the diffusion, kept for the next strain.
+    KUZURE_INLINE void diffuse(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
+                               const Lanes& lanes) const
+    {
+        auto& p = *in.particles;
+        const auto material = [&](int k) -> const Material& {
+            return in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][lanes.particle(k)]];
+        };
+        const U speed = lane_by_lane<U>([&](int k) { return material(k).rod_speed; });
+        const U K0 = lane_by_lane<U>([&](int k) { return material(k).at_rest; });
+        const U strength = U(2 * model_.stress_diffusion.zeta * h_ * scale_ / unit_) * speed;
+        const auto kept = p[field::stress_rate];
+        Sym3<U> rate = model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));
+        if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
+        kept.store(lanes.at, rate, lanes.n);
+    }
+    /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
+    KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const
+    {
+        const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(rows, lanes.first);
+        const U scale = U(scale_) * volume / rho;
+        const Vec3<U> held = scale * w.held;
+        auto& p = *in.particles;
+        if (!p.has(field::wall_slip)) return held;
+        const auto slip = p[field::wall_slip];
+        const auto pressure = p[field::wall_pressure];
+        const auto v = std::as_const(p)[field::velocity];
+        double out[3][width<U>] = {};
+        const auto at = [&](U a, int k) { return lane(a, k); };
+        for (int k = 0; k < lanes.n; ++k) {
+            if (!(lanes.moving >> (lanes.first + k) & 1)) continue;
+            const Index i = lanes.at + k;
+            const double s = at(scale, k);
+            const Vector push{s * at(w.pressing.x, k), s * at(w.pressing.y, k), s * at(w.pressing.z, k)};
+            const double held_by = s * at(w.limit, k), area = s * at(w.area, k);
+            // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
+            const bool faces = area != 0, approached = s * at(w.approach, k) > 0, pressed = held_by > 0;
+            if (!faces || !(pressed || approached)) {
+                slip.set(i, Vector{}), pressure.set(i, 0.0);
+                continue;
+            }
+            const double size = length(push);
+            const Vector normal = size > 0 ? (1 / size) * push : Vector{};
+            const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
+            // a spring of the soil's own shear stiffness across half a smoothing length
+            const double stiffness = pressed ? m.shear * std::fabs(area) / (0.5 * h_) : 0;
+            const auto f = return_to_coulomb(slip[i], in.dt * v[i], normal, pressed ? size : 0, held_by, stiffness);
+            slip.set(i, f.slip), pressure.set(i, pressed ? size : 0.0);
+            out[0][k] = push.x + f.force.x, out[1][k] = push.y + f.force.y, out[2][k] = push.z + f.force.z;
+        }
+        return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};
+    }
+};
+
+} // namespace kuzure

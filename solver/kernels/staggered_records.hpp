@@ -1,0 +1,200 @@
+#pragma once
+// Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghost rows and the walls. A stage reads
+// of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
+// buffered twice.
+#include "solver/kernels/cluster_pass.hpp"
+#include "solver/scene/scene.hpp"
+#include "solver/walls/adjoint.hpp"
+
+namespace kuzure {
+
+/// Where a particle is and how it moves: x [m or units of h/2^20], v [m/s], volume [m^3], rho [kg/m^3].
+template <class T> struct alignas(8 * sizeof(T)) Kinematics {
+    Coordinate<T> x, y, z;
+    T vx, vy, vz;
+    T volume, density;
+};
+/// What pushes its neighbours: sigma [Pa], volume [m^3]; awake as in Record.
+template <class T> struct alignas(8 * sizeof(T)) Stresses {
+    T xx, yy, zz, xy, yz, xz;
+    T volume, awake;
+};
+static_assert(sizeof(Kinematics<double>) == 64 && sizeof(Stresses<float>) == 32);
+
+/// Stages are layers over this class: each adds one pass (strain.hpp, force.hpp), a scheme puts them together (staggered.hpp).
+template <class M, class V, class Law = MirrorImage> class StaggeredRecords : public ClusterPass<M, V> {
+    using Base = ClusterPass<M, V>;
+
+public:
+    using Model = M;
+    using LaneType = V;
+    explicit StaggeredRecords(const scene::Interactions& s) : Base(s) {}
+    bool moves_first() const override { return true; }
+    void require_fields(Particles& p, bool coulomb) const override
+    {
+        p.require(field::acceleration);
+        if (M::diffusive) p.require(field::stress_rate);
+        if (coulomb) p.require(field::wall_slip, field::wall_pressure);
+    }
+    void start(Particles&) const override {}
+    std::size_t bytes() const override
+    {
+        return kinematics_.capacity() * sizeof(Kinematics<T>) + stresses_.capacity() * sizeof(Stresses<T>) +
+               tension_.capacity() * sizeof(Tension<T>) + speed_.capacity() * sizeof(T) + wall_bytes();
+    }
+
+    void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
+    {
+        const Index n = n_ = p.size();
+        const std::size_t count = std::size_t(n) + ghost_soil.size() + Particles::padding + 1;
+        kinematics_.resize(count), stresses_.resize(count);
+        if (M::tensile) tension_.resize(count);
+        if (soils.size() > 1) speed_.resize(count);
+        const bool sleepy = p.has(field::activity);
+#pragma omp parallel for schedule(static)
+        for (Index i = 0; i < n; ++i) {
+            const Material& m = soils[p[field::soil][i]];
+            const Vector x = p[field::position][i], v = p[field::velocity][i];
+            const Stress s = p[field::stress][i];
+            const double rho = p[field::density][i], volume = volume_ * m.density / rho;
+            kinematics_[i] = {place_(x.x), place_(x.y), place_(x.z), T(v.x), T(v.y), T(v.z), T(volume), T(rho)};
+            const bool awake = sleepy && p[field::activity][i] == std::int32_t(Activity::Moves);
+            stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
+            if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
+        }
+        for (std::size_t k = n; k < count; ++k) {
+            kinematics_[k] = far_away<T, Kinematics>();
+            stresses_[k] = {};
+            if (M::tensile) tension_[k] = {};
+        }
+        if (soils.size() > 1) {
+            for (Index i = 0; i < n; ++i) speed_[i] = T(soils[p[field::soil][i]].sound_speed);
+            for (std::size_t k = 0; k < ghost_soil.size(); ++k) speed_[n + k] = T(soils[ghost_soil[k]].sound_speed);
+            std::fill(speed_.begin() + n + ghost_soil.size(), speed_.end(), T(1));
+        }
+    }
+    void place_walls(const Scene& scene, std::span<const WallPoints> points) override
+    {
+        const WallSurface surface(scene);
+        walls_.assign(points.size(), {});
+        for (std::size_t w = 0; w < points.size(); ++w) {
+            auto& to = walls_[w];
+            const Index n = Index(points[w].x.size());
+            to.x.resize(n), to.y.resize(n), to.z.resize(n), to.first.assign(std::size_t(n) + 1, 0);
+            std::vector<std::vector<Face>> found(n);
+#pragma omp parallel for schedule(dynamic, 256)
+            for (Index k = 0; k < n; ++k) {
+                to.x[k] = place_(points[w].x[k]), to.y[k] = place_(points[w].y[k]), to.z[k] = place_(points[w].z[k]);
+                surface.faces({points[w].x[k], points[w].y[k], points[w].z[k]}, 2 * h_, found[k]);
+            }
+            for (Index k = 0; k < n; ++k) {
+                for (const Face& f : found[k]) {
+                    const scene::Wall& wall = scene.walls[f.wall];
+                    const bool coulomb = wall.surface == scene::Surface::Coulomb;
+                    to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
+                                        T(wall.surface == scene::Surface::Rough), T(coulomb),
+                                        T(coulomb ? std::tan(wall.friction_angle) : 0), T(0)});
+                }
+                to.first[k + 1] = Index(to.faces.size());
+                if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);
+            }
+        }
+    }
+    void pack(int stage, Index owned, Vector shift, std::byte* to) const override
+    {
+        if (stage == 0) {
+            Kinematics<T> r = kinematics_[owned];
+            r.x = place_.sum(r.x, place_(shift.x)), r.y = place_.sum(r.y, place_(shift.y)), r.z = place_.sum(r.z, place_(shift.z));
+            std::memcpy(to, &r, sizeof r);
+            return;
+        }
+        std::memcpy(to, &stresses_[owned], sizeof(Stresses<T>));
+        if constexpr (M::tensile) std::memcpy(to + sizeof(Stresses<T>), &tension_[owned], sizeof(Tension<T>));
+    }
+    void unpack(int stage, Index slot, const std::byte* from) override
+    {
+        if (stage == 0) {
+            std::memcpy(&kinematics_[n_ + slot], from, sizeof(Kinematics<T>));
+            return;
+        }
+        std::memcpy(&stresses_[n_ + slot], from, sizeof(Stresses<T>));
+        if constexpr (M::tensile) std::memcpy(&tension_[n_ + slot], from + sizeof(Stresses<T>), sizeof(Tension<T>));
+    }
+    void end_stage(int) override {}
+
+    /// Half a kick and the whole way of a step, and the kinematics for its strain.
+    void move(const StepInput& in) override
+    {
+        auto& p = *in.particles;
+        const Index n = p.size();
+        const U dt(in.dt), half_dt = U(0.5) * dt;
+        const auto x = p[field::position], v = p[field::velocity];
+        const auto a = std::as_const(p)[field::acceleration];
+        const auto rho = std::as_const(p)[field::density];
+        const auto soil = std::as_const(p)[field::soil];
+        const std::int32_t* activity = in.sleep == SleepStage::Frozen ? std::as_const(p)[field::activity].column[0] : nullptr;
+        const bool built = Index(kinematics_.size()) > n; // else the lists come next, and the records with them
+#pragma omp parallel for schedule(static)
+        for (Index at = 0; at < n; at += width<U>) {
+            const int lanes = std::min<Index>(width<U>, n - at);
+            const Vec3<U> x0 = x.template load<U>(at), v0 = v.template load<U>(at);
+            Vec3<U> u = fma(half_dt, a.template load<U>(at), v0), x1 = fma(dt, u, x0);
+            if (activity) {
+                double awake[width<U>];
+                for (int k = 0; k < width<U>; ++k) awake[k] = k < lanes && activity[at + k] != std::int32_t(Activity::Asleep);
+                const auto moves = less(U(0.5), load<U>(awake));
+                u = select(moves, u, v0), x1 = select(moves, x1, x0);
+            }
+            x.store(at, x1, lanes), v.store(at, u, lanes);
+            if (!built) continue;
+            for (int k = 0; k < lanes; ++k) {
+                const double density = rho[at + k];
+                const Material& m = in.soils[in.soils.size() == 1 ? 0 : soil[at + k]];
+                const Vector here = x[at + k], moving = v[at + k];
+                kinematics_[at + k] = {
+                    place_(here.x), place_(here.y), place_(here.z), T(moving.x), T(moving.y), T(moving.z), T(volume_ * m.density / density),
+                    T(density)};
+            }
+        }
+    }
+
+protected:
+    using Base::unit_, Base::h_, Base::volume_, Base::model_, Base::place_;
+    using typename Base::T, typename Base::U;
+
+    std::size_t wall_bytes() const
+    {
+        std::size_t b = 0;
+        for (const auto& w : walls_)
+            b += w.x.size() * 3 * sizeof(w.x[0]) + w.first.size() * sizeof(Index) + w.faces.size() * sizeof(FaceRecord<T>);
+        return b;
+    }
+
+    /// Visits the wall points inside the support: visit(r, r^2, lanes that they hit, mirror); `back` is taken off the positions.
+    template <class Visit>
+    KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, std::span<const Index> runs, Vec3<V> back, Visit visit) const
+    {
+        const V support2(T(4 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
+        while (!runs.empty()) {
+            const WallRecords<T>& wall = walls_[runs[0]];
+            const auto list = runs.subspan(2, runs[1]);
+            runs = runs.subspan(2 + runs[1]);
+            for (const Index point : list) {
+                const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]) - back;
+                const V r2 = dot(r, r);
+                const unsigned hits = bits(less(r2, support2)) & i.owned;
+                if (!hits || wall.first[point] == wall.first[point + 1]) continue;
+                visit(r, max(r2, tiny), hits, mirror(Law{}, r, &wall.faces[wall.first[point]]));
+            }
+        }
+    }
+
+    std::vector<WallRecords<T>> walls_;
+    Index n_ = 0;
+    Array<Kinematics<T>> kinematics_;
+    Array<Stresses<T>> stresses_;
+    Array<Tension<T>> tension_;
+    Array<T> speed_; // c_p by record, where there are several soils
+};
+
+} // namespace kuzure

@@ -1,0 +1,284 @@
+#pragma once
+// The strain stage of the staggered scheme: velocity gradient at mid-step, from it density, stress and plastic strain, and the viscous
+// force, which waits in the acceleration's column for the force stage.
+#include "solver/kernels/staggered_records.hpp"
+
+namespace kuzure {
+
+/// sum V_j rho_i rho_j Pi grad W: the force of viscosity, against the particle's.
+struct ViscousForce {
+    template <class V> struct Sums {
+        Vec3<V> viscous;
+    };
+    static constexpr double flops = 6;
+    template <class V> KUZURE_INLINE void add(Sums<V>& to, const Batch<V>& batch) const
+    {
+        for (int k = 0; k < batch.size; ++k) to.viscous = fma(batch.at[k].rho2_Pi, batch.at[k].grad, to.viscous);
+    }
+};
+struct NoViscousForce {
+    template <class V> struct Sums {
+    };
+    static constexpr double flops = 0;
+    template <class V> KUZURE_INLINE void add(Sums<V>&, const Batch<V>&) const {}
+};
+
+template <class Below> class StrainStage : public Below {
+    using M = typename Below::Model;
+    using V = typename Below::LaneType;
+
+protected:
+    using Below::W, Below::unit_, Below::dimensions_, Below::h_, Below::volume_, Below::model_, Below::scale_, Below::kinematics_,
+        Below::stresses_, Below::tension_, Below::speed_, Below::walls_;
+    using typename Below::T, typename Below::U;
+    using Viscous = std::conditional_t<M::viscous, ViscousForce, NoViscousForce>;
+
+    /// What walls add to the sums of a cluster; over wall points j of volume 1, f_ij the mirror factor.
+    struct WallStrain {
+        template <class S> struct Sums {
+            Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
+            Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
+            S walled;                  // not zero for a particle that feels a wall
+        };
+    };
+    template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
+    template <class S> using StrainWalls = WallStrain::template Sums<S>;
+    using Lane = Row<W>;
+
+    explicit StrainStage(const scene::Interactions& s) : Below(s) {}
+
+    /// Geometry: r and its half step 9, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, shape and volume 8, grad W 3;
+    /// viscosity: approach 6, pressure 6. Update: scaled sums 12, rotation 110, increments 40, return to the cone 40, energies 60.
+    static Stage strain_stage()
+    {
+        return {"strain", sizeof(Kinematics<T>),
+                39 + (M::viscous ? 12.0 : 0.0) + VelocityGradient::flops + Viscous::flops + M::CorrectionTerm::flops, 262,
+                23 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
+    }
+    PassResult run_strain(const StepInput& in, std::span<const Index> clusters)
+    {
+        return Below::over(
+            clusters, [&](Index c, Tally<U> & tally) __attribute__((always_inline)) { strain_cluster(in, c, tally); });
+    }
+
+private:
+    KUZURE_INLINE void strain_cluster(const StepInput& in, Index cluster, Tally<U>& tally)
+    {
+        Cluster<V> i = Below::cluster_at(in, cluster, tally);
+        if (i.moving == 0) { // its list is pruned when it wakes
+            if (in.prune) in.lists->pruned(cluster).n = -1;
+            return;
+        }
+        Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
+        const auto near = Below::near(i, in, cluster, kinematics_.data());
+        StrainSums<Lane> sums;
+        sum_strain(in, i, near, sums);
+        StrainWalls<Lane> walls{};
+        const auto runs = in.lists->walls(cluster);
+        if (!runs.empty()) sum_wall_strain(in, i, runs, walls);
+        Below::for_each_register(
+            i, [&](const Lanes& lanes) __attribute__((always_inline)) { update_strain(in, sums, walls, !runs.empty(), lanes, tally); });
+    }
+
+    KUZURE_INLINE void sum_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, StrainSums<Lane>& out) const
+    {
+        const Kinematics<T>* records = kinematics_.data();
+        const bool one_soil = in.soils.size() == 1;
+        const T* speed = one_soil ? nullptr : speed_.data();
+        const V support(T(2 * model_.kernel.h)), softening(T(0.01 * model_.kernel.h * model_.kernel.h));
+        const V tiny(T(1e-12 * model_.kernel.h * model_.kernel.h)), zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
+        Batch<V> batch;
+        StrainSums<V> sums{};
+        const int n = int(near.size());
+        for (int b = 0; b < n; b += batch.capacity) {
+            batch.neighbour = &near[b];
+            batch.size = std::min(batch.capacity, n - b);
+            for (int k = 0; k < batch.size; ++k) {
+                const Kinematics<T>& j = records[batch.neighbour[k]];
+                Entry<V>& e = batch.at[k];
+                const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+                const Vec3<V> r = fma(half_dt, v, i.position.minus(j)); // half a step back
+                const V r2 = max(dot(r, r), tiny);
+                const V rho_sum = i.rho + j.density;
+                const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+                const V t = max(support - inv.root, zero);
+                e.grad = (model_.kernel.shape(t, inv.root, inv.inverse_root) * j.volume) * r;
+                e.v = v;
+                if constexpr (M::viscous) {
+                    // rho_i rho_j Pi > 0 where the two approach
+                    const V approach = max(dot(v, r), zero);
+                    const V c = one_soil ? i.c : V(speed[batch.neighbour[k]]);
+                    e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
+                }
+                if constexpr (M::corrected) e.r = r;
+            }
+            VelocityGradient{}.add(sums, batch);
+            Viscous{}.add(sums, batch);
+            if constexpr (M::corrected) model_.correction.add(sums, batch);
+        }
+        widen<V>(sums, out);
+    }
+
+    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
+                                           StrainWalls<Lane>& out) const
+    {
+        const V half_dt(T(0.5 * in.dt / unit_));
+        const Vec3<V> back{half_dt * i.v.x, half_dt * i.v.y, half_dt * i.v.z};
+        StrainWalls<V> sums{};
+        Below::for_each_wall_pair(i, runs, back, [&](Vec3<V> r, V r2, unsigned, const Mirror<V>& m) {
+            const V support(T(2 * model_.kernel.h)), softening(T(0.01 * model_.kernel.h * model_.kernel.h)), zero(T(0));
+            const V rho_sum = i.rho + i.rho;
+            const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+            const Vec3<V> g = model_.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
+            const Vec3<V> Pv = m.factor * project(m, i.v);
+            const V slides = m.coulomb, holds = V(T(1)) - slides;
+            const auto add = [&](Vec3<V>& held, Vec3<V>& sliding, V v) {
+                held = fma(holds * v, g, held), sliding = fma(slides * v, g, sliding);
+            };
+            add(sums.mirrored.x, sums.sliding.x, Pv.x), add(sums.mirrored.y, sums.sliding.y, Pv.y),
+                add(sums.mirrored.z, sums.sliding.z, Pv.z);
+            sums.walled = sums.walled + dot(g, m.normal);
+            if constexpr (M::viscous) {
+                const V approach = max(-dot(Pv, r), zero);
+                const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
+                sums.viscous = fma(pressure, project(m, g), sums.viscous);
+            }
+        });
+        widen<V>(sums, out);
+    }
+
+    struct Strained {
+        Sym3<U> sigma;
+        U rho, plastic_strain;
+        Vec3<U> viscous; // acceleration, m/s^2
+    };
+
+    KUZURE_INLINE void update_strain(const StepInput& in, const StrainSums<Lane>& rows, const StrainWalls<Lane>& wall_rows, bool walled,
+                                     const Lanes& lanes, Tally<U>& tally)
+    {
+        auto& p = *in.particles;
+        const auto& was = std::as_const(p);
+        const U one(1.0), zero(0.0), half(0.5), factor(scale_), dt(in.dt), half_dt = half * dt;
+        const auto sums = lanes_at<U, StrainSums<U>, StrainSums<Lane>, W>(rows, lanes.first);
+        LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
+        const Sym3<U> sigma = was[field::stress].template load<U>(lanes.at);
+        const U rho = was[field::density].template load<U>(lanes.at);
+        const U plastic = was[field::plastic_strain].template load<U>(lanes.at);
+        const U per_rho = factor / rho;
+
+        Mat3<U> L{factor * sums.grad_v.x, factor * sums.grad_v.y, factor * sums.grad_v.z};
+        Vec3<U> viscous{zero, zero, zero};
+        if constexpr (M::viscous) viscous = -per_rho * sums.viscous;
+        Mat3<U> at_walls{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+        U feels_wall = zero;
+        if (walled) {
+            const auto w = lanes_at<U, StrainWalls<U>, StrainWalls<Lane>, W>(wall_rows, lanes.first);
+            const U volume = U(volume_) * soil.rho0 / rho; // a wall particle has the soil's
+            at_walls = wall_gradient(in, w, lanes, -factor * volume);
+            feels_wall = select(less(zero, abs(w.walled)), one, zero);
+            if constexpr (M::viscous) viscous = viscous - (per_rho * volume) * w.viscous;
+        }
+        if constexpr (M::corrected)
+            if (model_.correct) {
+                const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
+                const Sym3<U> correction = GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - feels_wall);
+                L = {correction * L.x, correction * L.y, correction * L.z};
+            }
+        L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
+
+        const Sym3<U> D = symmetric_part(L);
+        if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
+        Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
+        if constexpr (M::diffusive) diffusion = was[field::stress_rate].template load<U>(lanes.at);
+        // half before the turn and half after: second order in time, and exact in energy
+        const Sym3<U> strain = dt * D;
+        const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
+        const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
+        auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
+        // drho/dt = -rho tr L, by the midpoint rule
+        const U change = half_dt * trace(L);
+        Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.shear_strain, viscous};
+
+        const auto mine = written<U>(lanes);
+        if (in.sleep == SleepStage::Frozen) {
+            next.sigma = select(mine, next.sigma, sigma), next.rho = select(mine, next.rho, rho);
+            next.plastic_strain = select(mine, next.plastic_strain, plastic);
+            mapped.opened = select(mine, mapped.opened, opened);
+            next.viscous = select(mine, next.viscous, was[field::acceleration].template load<U>(lanes.at));
+        }
+        if (in.dt > 0) { // at the start of a run only the viscous force is wanted
+            p[field::stress].store(lanes.at, next.sigma, lanes.n);
+            p[field::density].store(lanes.at, next.rho, lanes.n);
+            p[field::plastic_strain].store(lanes.at, next.plastic_strain, lanes.n);
+            if (in.remembering) p[field::opened_volume].store(lanes.at, mapped.opened, lanes.n);
+        } else next.sigma = sigma, next.rho = rho;
+        p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
+        write_stresses(in, lanes, soil, next);
+
+        tell(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
+    }
+    struct Strain { // of one step: stress and density before and after, rate of strain, stress rate of the diffusion, L of the walls
+        Sym3<U> before, after;
+        U rho_before, rho_after;
+        Sym3<U> D, diffusion;
+        Mat3<U> at_walls;
+    };
+    /// Energies: plastic work is what the mean stress did less what is stored; exact sums of rounded addends. Maxima.
+    KUZURE_INLINE void tell(const StepInput& in, const Lanes& lanes, const Strain& s, const LaneSoil<U>& soil, bool walled,
+                            Tally<U>& tally) const
+    {
+        const U zero(0.0), half(0.5), dt(in.dt), magic(magic_of(in.energy_unit));
+        const auto mine = written<U>(lanes);
+        const U mass = U(volume_) * soil.rho0, volume = half * (mass / s.rho_before + mass / s.rho_after);
+        const Sym3<U> mean = half * (s.before + s.after);
+        const U diffused = compliance(mean, dt * s.diffusion, soil.law); // work of the diffusion, J/m^3
+        const U stored = half * (compliance(s.after, s.after, soil.law) - compliance(s.before, s.before, soil.law));
+        const U worked = quantized(volume * (contract(mean, dt * s.D) + diffused - stored), magic);
+        tally.energy.plastic += select(mine, worked, zero);
+        if constexpr (M::diffusive) tally.energy.stabilising -= select(mine, quantized(volume * diffused, magic), zero);
+        if (walled) {
+            const U taken = quantized(volume * contract(mean, dt * symmetric_part(s.at_walls)), magic);
+            tally.energy.wall -= select(mine, taken, zero);
+        }
+        const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
+        meet(tally.maxima.density_ratio, max(s.rho_after / soil.rho0, soil.rho0 / s.rho_after));
+        meet(tally.maxima.signal, fma(U(h_), sqrt(contract(s.D, s.D)), soil.c));
+        tally.poison += select(mine, fma(zero, trace(s.after), zero * s.rho_after), zero);
+    }
+    /// sigma : C^-1 : tau = s : dev(tau)/(2 G) + tr(sigma) tr(tau)/(9 K)
+    static KUZURE_INLINE U compliance(Sym3<U> sigma, Sym3<U> tau, const Elastoplastic<U>& soil)
+    {
+        return contract(deviator(sigma), deviator(tau)) / (soil.shear + soil.shear) + trace(sigma) * trace(tau) / (U(9.0) * soil.bulk);
+    }
+    /// L of the walls from their sums. A Coulomb face counts where it was pressed on at the step's start, or is approached.
+    KUZURE_INLINE Mat3<U> wall_gradient(const StepInput& in, const StrainWalls<U>& w, const Lanes& lanes, U scale) const
+    {
+        Mat3<U> L{scale * w.mirrored.x, scale * w.mirrored.y, scale * w.mirrored.z};
+        const auto& p = std::as_const(*in.particles);
+        if (!p.has(field::wall_pressure)) return L;
+        const U zero(0.0), one(1.0);
+        const U pressed = select(less(zero, p[field::wall_pressure].template load<U>(lanes.at)), one, zero);
+        const U use = select(less(scale * trace(w.sliding), zero), one, pressed) * scale;
+        return {fma(use, w.sliding.x, L.x), fma(use, w.sliding.y, L.y), fma(use, w.sliding.z, L.z)};
+    }
+    KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
+    {
+        double rows[7][width<U>];
+        const U columns[7] = {
+            next.sigma.xx, next.sigma.yy, next.sigma.zz, next.sigma.xy, next.sigma.yz, next.sigma.xz, U(volume_) * soil.rho0 / next.rho};
+        for (int k = 0; k < 7; ++k) store(rows[k], columns[k]);
+        const std::int32_t* activity = in.sleep == SleepStage::Off ? nullptr : std::as_const(*in.particles)[field::activity].column[0];
+        for (int k = 0; k < lanes.n; ++k) {
+            Stresses<T>& r = stresses_[lanes.at + k];
+            r.xx = T(rows[0][k]), r.yy = T(rows[1][k]), r.zz = T(rows[2][k]);
+            r.xy = T(rows[3][k]), r.yz = T(rows[4][k]), r.xz = T(rows[5][k]);
+            r.volume = T(rows[6][k]);
+            if (activity) r.awake = T(activity[lanes.at + k] == std::int32_t(Activity::Moves));
+            if constexpr (M::tensile)
+                tension_[lanes.at + k] = make_tension<T>(Stress{rows[0][k], rows[1][k], rows[2][k], rows[3][k], rows[4][k], rows[5][k]},
+                                                         model_.artificial_stress.epsilon);
+        }
+    }
+};
+
+} // namespace kuzure
