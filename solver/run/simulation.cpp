@@ -28,9 +28,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options,
 Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options) : Simulation(comm, scene, std::move(options), Clock{})
 {
     timers_.timed(Phase::Setup, [&] {
-        prepare();
-        balance_.cut_start(scene_, filling_, timers_);
-        fill_start(comm_, domain_, scene_, filling_, soils_, particles_);
+        start_soil();
         if (options_.initial) options_.initial(particles_);
         model_->start(particles_);
         double fastest = 0, drift = 0;
@@ -72,6 +70,25 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
 }
 
 Simulation::~Simulation() = default;
+
+void Simulation::start_soil()
+{
+    if (!options_.start && !options_.settles)
+        if (const auto why = no_closed_form(scene_, filling_); !why.empty()) {
+            settled_.emplace().why = why;
+            options_.start = settle(comm_, scene_, filling_, options_, *settled_);
+        }
+    if (!options_.start) {
+        prepare();
+        balance_.cut_start(scene_, filling_, timers_);
+        return fill_start(comm_, domain_, scene_, filling_, soils_, particles_);
+    }
+    particles_ = std::move(*options_.start);
+    options_.start.reset();
+    prepare();
+    if (settled_) add_restless(comm_, scene_, filling_, soils_, particles_);
+    balance_.cut_state(scene_, particles_, layout_, false, [] {});
+}
 
 void Simulation::prepare()
 {

@@ -7,6 +7,7 @@
 #include "solver/run/balance.hpp"
 #include "solver/run/clock.hpp"
 #include "solver/run/layout.hpp"
+#include "solver/run/settle.hpp"
 #include "solver/run/watch.hpp"
 
 namespace kuzure {
@@ -20,6 +21,12 @@ struct RunOptions {
     /// Called on every rank once its soil is filled: sets initial fields that a scene cannot say.
     std::function<void(Particles&)> initial = {};
     std::optional<scene::Filling> filling = {}; // particles of this scene, if the caller already has them
+    bool settles = false;                       // this is a settling run itself
+    /// Called on every rank before each step of the settling run; true on any asks it to stop.
+    std::function<bool(const Settling&)> settling = {};
+    /// The soil that the run starts from instead of the scene's filling, each id once, on any rank: place, velocity, density, stress, what
+    /// it remembers. Displacements count from there.
+    std::optional<Particles> start = {};
 };
 
 /// What a rank asks for after a step; travels with the step's only reduction.
@@ -45,6 +52,9 @@ public:
     std::int64_t steps() const { return clock_.step; }
     double dt() const { return clock_.dt; }
     double max_speed() const { return std::sqrt(clock_.extremes.speed2); }
+    double max_acceleration() const { return std::sqrt(clock_.extremes.acceleration2); }
+    /// How the soil settled before t = 0, if it had to.
+    const std::optional<Settling>& settled() const { return settled_; }
     const Particles& particles() const { return particles_; }
     const scene::Filling& filling() const { return filling_; }
     const Scene& scene() const { return scene_; }
@@ -84,6 +94,8 @@ private:
     /// Of a state that a step of this length led to, s.
     Ledger ledger(double dt) const;
     void prepare();
+    /// This rank's share of the soil at t = 0, where it is to be. Collective.
+    void start_soil();
     void rebuild(bool sort_anew, double way = 0);
     StepInput step_input(double dt, double next);
     /// The forces of the start, where steps need them first. Collective.
@@ -115,6 +127,7 @@ private:
     Balance balance_;
     Watch watch_;
     Particles particles_;
+    std::optional<Settling> settled_;
     PoreWater water_;
     bool evolving_ = false, remembering_ = false;
     std::int64_t sleep_interval_ = 1; // steps between detections, where soil may sleep

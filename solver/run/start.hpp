@@ -10,6 +10,9 @@ namespace kuzure {
 /// Fills this rank's blocks with the scene's soil, with its velocities and initial stresses. Collective. The fields are required.
 void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
 
+/// Adds this rank's even share of the bodies that are not "at rest" to soil that is there already.
+void add_restless(const Comm&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
+
 /// Energy scale of a whole run, J: weight times height, or kinetic energy, or a little strain.
 double energy_scale(const Scene&, const scene::Filling&, std::span<const Material>);
 /// The unit that energies of this scale (J) are sums of, a power of two: 64-bit sums hold 2^17 times the scale, however far soil may fall.

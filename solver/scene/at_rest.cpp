@@ -1,4 +1,5 @@
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/material.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 
@@ -198,6 +199,21 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
         if (!why.empty()) break;
     }
     return why;
+}
+
+double crossing_time(const Scene& scene, const Filling& filling)
+{
+    double c = std::numeric_limits<double>::infinity();
+    for (const Body& b : scene.bodies)
+        if (b.stress == InitialStress::AtRest) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).sound_speed);
+    return (filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing) / c;
+}
+
+double steps_to_settle(const Scene& scene, const Filling& filling)
+{
+    double c = 0;
+    for (const Soil& soil : scene.soils) c = std::max(c, Material::from(soil).sound_speed);
+    return 8 * crossing_time(scene, filling) / scene.time.step.value_or(scene.accuracy.cfl * scene.smoothing_length() / c);
 }
 
 } // namespace kuzure::scene

@@ -33,7 +33,11 @@ private:
 /// Why the stress of columns, K0 times the weight above, is no equilibrium of the soil "at rest": tilted gravity, ground or water table
 /// that is not level, a wall beside it just out of reach. Empty where it is one, or where nothing starts at rest. Soil that a gate
 /// holds, free at its sides, passes: only the heights of soil that touches sideways are compared. Where this says why, a settling run
-/// has to find the state.
+/// finds the state (run/settle.hpp).
 std::string no_closed_form(const Scene&, const Filling&);
+/// Steps that this settling run is likely to take: a P-wave passes eight times through the height of the soil.
+double steps_to_settle(const Scene&, const Filling&);
+/// Seconds that a P-wave takes through the height of the soil at rest, the slowest of several soils.
+double crossing_time(const Scene&, const Filling&);
 
 } // namespace kuzure::scene

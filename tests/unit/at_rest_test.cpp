@@ -280,16 +280,20 @@ TEST(AtRest, AWallBesideItHasToBeReached)
     EXPECT_EQ(why(made(0.1, {Box{{0, 0, 0}, {1, 1, 1}}}, 3, {Box{{0, 1, 0}, {1, 1.4, 2}}, Box{{0, 0, -0.4}, {1, 1, 0}}})), "");
 }
 
-TEST(AtRest, CheckWarnsWhereItIsNoEquilibrium)
+TEST(AtRest, CheckSaysWhereItSettlesAndWhatThatTakes)
 {
-    const auto warning = [](const Scene& s) {
-        for (const auto& issue : check(s))
-            if (issue.key == "body.0.stress" && issue.severity == Severity::Warning) return issue.text;
+    const auto note = [](const Scene& s) {
+        Issues issues;
+        const auto made = ready(s, StepLimit::Enforce, issues);
+        for (const auto& n : made.value().scene.notes)
+            if (n.name == "settling") return n.why;
         return std::string();
     };
     auto s = made(0.1, {Polygon{{{0, 0}, {3, 0}, {1, 1}, {0, 1}}, {}}});
     s.soils[0].cone = Cone::PlaneStrain;
-    EXPECT_THAT(warning(s), AllOf(HasSubstr("is no equilibrium here: the ground is not level"), HasSubstr("effects.damping")));
+    EXPECT_THAT(note(s), AllOf(HasSubstr("the ground is not level"), HasSubstr("before t = 0, about")));
     s.bodies[0].shape = Box{{0, 0, 0}, {3, 0, 1}};
-    EXPECT_EQ(warning(s), "");
+    EXPECT_EQ(note(s), "");
+    s.effects.gravity = Vector{1, 0, -9};
+    EXPECT_THAT(note(s), HasSubstr("gravity does not point straight down"));
 }

@@ -1,0 +1,132 @@
+#include "solver/run/settle.hpp"
+#include "solver/run/simulation.hpp"
+#include "solver/scene/at_rest.hpp"
+#include <fmt/format.h>
+#include <limits>
+
+namespace kuzure {
+namespace {
+
+double gravity(const Scene& s) { return length(s.effects.gravity.value_or(Vector{})); }
+
+bool rests(const scene::Body& b) { return b.stress == scene::InitialStress::AtRest; }
+
+/// The scene with nothing but its soil at rest, critically damped in its lowest mode for as long as it takes; strength is that of soil
+/// that has not yet been sheared. `held`: so strong that nothing yields.
+Scene settling_scene(const Scene& scene, double end, bool held)
+{
+    Scene s = scene;
+    std::erase_if(s.bodies, [](const scene::Body& b) { return !rests(b); });
+    for (auto& b : s.bodies) b.velocity = {};
+    for (auto& soil : s.soils) {
+        soil.softening.reset(), soil.dilation_decay.reset(), soil.rate_friction.reset();
+        if (held) soil.cohesion = 1e3 * soil.young, soil.tension_cutoff.reset();
+    }
+    s.effects.damping = scene::Damping{1, std::numeric_limits<double>::infinity()};
+    s.time.end = end, s.time.retry = false;
+    s.accuracy.sleep_below = 0;
+    return s;
+}
+
+/// Ids of the whole scene from those of its bodies at rest alone.
+class Ids {
+public:
+    Ids(const Scene& scene, const scene::Filling& filling)
+    {
+        std::int64_t first = 0, own = 0;
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+            const std::int64_t n = filling.body_count(int(b));
+            if (rests(scene.bodies[b])) parts_.push_back({own, first - own, int(b)}), own += n;
+            first += n;
+        }
+    }
+    struct Found {
+        std::int64_t id;
+        int body;
+    };
+    Found operator()(std::int64_t own) const
+    {
+        auto p = std::find_if(parts_.rbegin(), parts_.rend(), [&](const Part& q) { return q.first <= own; });
+        return {own + p->offset, p->body};
+    }
+
+private:
+    struct Part {
+        std::int64_t first, offset;
+        int body;
+    };
+    std::vector<Part> parts_;
+};
+
+double displacement(const Comm& comm, const Particles& p)
+{
+    double d = 0;
+    for (Index i = 0; i < p.size(); ++i) d = std::max(d, length(p[field::position][i] - p[field::origin][i]));
+    return comm.max(d);
+}
+
+/// Runs until the soil rests; false if its time is over before, or it has moved by more than `most` m.
+bool come_to_rest(Simulation& sim, const RunOptions& options, double most, Settling& s)
+{
+    const double slow = settled_speed(sim.scene()), weak = settled_acceleration(sim.scene());
+    int calm = 0;
+    while (!sim.finished()) {
+        const std::int64_t before = s.steps;
+        s.speed = sim.max_speed(), s.acceleration = sim.max_acceleration(), s.time = sim.time();
+        if (sim.step({.stop = options.settling && options.settling(s)}).stop) throw SettlingStopped();
+        s.steps = before + 1;
+        // at a turning point a wave stands still for a moment
+        calm = sim.max_speed() < slow && sim.max_acceleration() < weak ? calm + 1 : 0;
+        if (calm >= 10) break;
+        if (sim.steps() % 32 == 0 && displacement(sim.comm(), sim.particles()) > most) return false;
+    }
+    s.speed = sim.max_speed(), s.acceleration = sim.max_acceleration(), s.time = sim.time();
+    s.displacement = displacement(sim.comm(), sim.particles());
+    s.at_rest = calm >= 10;
+    return s.at_rest && s.displacement <= most;
+}
+
+} // namespace
+
+double settled_speed(const Scene& s) { return 5e-4 * std::sqrt(gravity(s) * s.space.spacing); }
+double settled_acceleration(const Scene& s) { return 0.02 * gravity(s); }
+
+Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& filling, const RunOptions& options, Settling& s)
+{
+    // Soil that stands sinks by its elastic strain under its own weight at most, rho g H^2/E, from zero stress.
+    double most = scene.space.spacing;
+    const double height = filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing;
+    for (const auto& b : scene.bodies)
+        if (rests(b)) {
+            const auto& soil = scene.soils[std::size_t(b.soil)];
+            most = std::max(most, scene.space.spacing + soil.density * gravity(scene) * height * height / soil.young);
+        }
+    RunOptions inner{options.arithmetic, options.recut_every, options.blocks_per_rank};
+    inner.settles = true;
+    std::optional<Simulation> sim;
+    try {
+        const double end = 30 * crossing_time(scene, filling);
+        sim.emplace(comm, settling_scene(scene, end, false), inner);
+        s.held = !come_to_rest(*sim, options, most, s);
+        if (s.held) {
+            sim.emplace(comm, settling_scene(scene, end, true), inner);
+            come_to_rest(*sim, options, std::numeric_limits<double>::infinity(), s);
+        }
+    } catch (const NumbersFailed& e) {
+        throw NumbersFailed(fmt::format("while the soil settled, before t = 0: {}", e.what()));
+    }
+    Particles p = sim->particles();
+    sim.reset();
+    const Ids ids(scene, filling);
+    for (Index i = 0; i < p.size(); ++i) {
+        const auto found = ids(p[field::id][i]);
+        Vector v = scene.bodies[std::size_t(found.body)].velocity;
+        if (scene.dimensions == 2) v.y = 0;
+        p[field::id].set(i, found.id), p[field::velocity].set(i, v), p[field::plastic_strain].set(i, 0.0);
+        p[field::origin].set(i, p[field::position][i]), p[field::sorted_position].set(i, p[field::position][i]);
+        if (s.held && p.has(field::opened_volume)) p[field::opened_volume].set(i, 0.0);
+    }
+    return p;
+}
+
+} // namespace kuzure
