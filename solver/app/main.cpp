@@ -2,9 +2,9 @@
 #include "decomposition/launcher.hpp"
 #include "io/hdf5.hpp"
 #include "io/quote.hpp"
-#include "solver/app/command.hpp"
-#include "solver/app/command_line.hpp"
-#include "solver/app/signals.hpp"
+#include "solver/app/cli/command.hpp"
+#include "solver/app/cli/command_line.hpp"
+#include "solver/app/cli/signals.hpp"
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>

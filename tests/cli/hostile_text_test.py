@@ -132,24 +132,24 @@ try:
         call("job", "s.toml", "--machine", "slurm", "--nodes", "1", "--account=" + account, expect=2, says=["--account", "letters, digits"])
     for minutes in ("0.001", "1e9", "nan", "-5"):
         call("job", "s.toml", "--machine", "slurm", "--nodes", "1", "--minutes", minutes, expect=2, says=["--minutes"])
-    # ---- jobs/sweep.py: names become directories and figures
-    def sweep(name, case, expect, says):
-        write("sweep.toml", f'title = "w"\nkind = "strong"\n{case}')
+    # ---- jobs/scaling.py: names become directories and figures
+    def scaling(name, case, expect, says):
+        write("scaling.toml", f'title = "w"\nkind = "strong"\n{case}')
         before = everything()
-        done = subprocess.run(["/usr/bin/python3", root + "/jobs/sweep.py", "sweep.toml", "--kuzure", program, "-o", "swept"], capture_output=True, text=True, cwd=work,
+        done = subprocess.run(["/usr/bin/python3", root + "/jobs/scaling.py", "scaling.toml", "--kuzure", program, "-o", "swept"], capture_output=True, text=True, cwd=work,
                               timeout=120)
         wrong = [w for w in says if w not in done.stderr]
-        check(done.returncode == expect and not wrong and "Traceback" not in done.stderr, f"sweep.py, {name}: exit {done.returncode}, missing {wrong} {done.stderr[-300:]}")
-        check(not os.path.exists(work + "/out") and os.path.exists(work + "/s.toml"), f"sweep.py, {name}: nothing outside")
+        check(done.returncode == expect and not wrong and "Traceback" not in done.stderr, f"scaling.py, {name}: exit {done.returncode}, missing {wrong} {done.stderr[-300:]}")
+        check(not os.path.exists(work + "/out") and os.path.exists(work + "/s.toml"), f"scaling.py, {name}: nothing outside")
     case = '[[case]]\nscene = "s.toml"\n'
     for bad in ("../../x", "a`touch out`", "a\\nb", "$(touch out)", 'a\\"b', "", ".", "-x", "a b"):
-        sweep(f"series {bad!r}", case + f'series = "{bad}"\n', 2, ["series", "letters, digits"])
-    sweep("a list of sets that is none", 'set = "x"\n' + case, 2, ["set", "array of strings"])
-    sweep("layouts of words", '[here]\nlayouts = [["1`touch out`", 1]]\n' + case, 2, ["layouts"])
-    sweep("sets of two lines", 'set = ["a\\nb"]\n' + case, 2, ["set", "one line"])
+        scaling(f"series {bad!r}", case + f'series = "{bad}"\n', 2, ["series", "letters, digits"])
+    scaling("a list of sets that is none", 'set = "x"\n' + case, 2, ["set", "array of strings"])
+    scaling("layouts of words", '[here]\nlayouts = [["1`touch out`", 1]]\n' + case, 2, ["layouts"])
+    scaling("sets of two lines", 'set = ["a\\nb"]\n' + case, 2, ["set", "one line"])
     os.makedirs(work + "/victim")
     write("victim/keep", "mine")
-    sweep("a name upwards", case + 'series = "../victim"\n', 2, ["series"])
+    scaling("a name upwards", case + 'series = "../victim"\n', 2, ["series"])
     check(open(work + "/victim/keep").read() == "mine", "what lies elsewhere is left alone")
     # ---- kuzure study: titles and curves become figures, its directory is a user's
     STUDY = 'title = "{title}"\nscene = "s.toml"\nmeasures = ["run-out"]\n[base]\n"space.spacing" = 0.04\n[[point]]\nname = "{name}"\n"space.h" = 1.3\n'

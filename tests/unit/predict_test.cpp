@@ -1,4 +1,4 @@
-#include "solver/app/predict.hpp"
+#include "solver/app/scaling/predict.hpp"
 #include <cmath>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What the system tells a program asks it to stop and never ends it without its knowing.
-#include "solver/app/signals.hpp"
+#include "solver/app/cli/signals.hpp"
 #include <cerrno>
 #include <csignal>
 #include <fcntl.h>

@@ -4,7 +4,7 @@
 #include "io/sweep_file.hpp"
 #include "solver/app/study/convergence.hpp"
 #include "solver/app/study/dial.hpp"
-#include "solver/app/study/heap.hpp"
+#include "solver/app/study/profile.hpp"
 #include "solver/app/study/study.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/scene/fill.hpp"

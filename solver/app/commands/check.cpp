@@ -1,9 +1,9 @@
 // kuzure check: what will be simulated and why, counts, step, memory, disk. Runs nothing.
 #include "solver/scene/check.hpp"
 #include "io/summary.hpp"
-#include "solver/app/command.hpp"
-#include "solver/app/forecast.hpp"
-#include "solver/app/predict.hpp"
+#include "solver/app/cli/command.hpp"
+#include "solver/app/scaling/forecast.hpp"
+#include "solver/app/scaling/predict.hpp"
 #include "solver/app/study/dial.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include "solver/scene/material.hpp"

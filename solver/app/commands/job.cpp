@@ -1,8 +1,8 @@
 // kuzure job: a batch script for a machine of jobs/machines, to standard output.
 #include "io/quote.hpp"
-#include "solver/app/command.hpp"
-#include "solver/app/command_line.hpp"
-#include "solver/app/predict.hpp"
+#include "solver/app/cli/command.hpp"
+#include "solver/app/cli/command_line.hpp"
+#include "solver/app/scaling/predict.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include <CLI/CLI.hpp>
 #include <cmath>

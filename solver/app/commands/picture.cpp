@@ -2,8 +2,8 @@
 #include "io/keys.hpp"
 #include "io/picture_series.hpp"
 #include "io/soil_color.hpp"
-#include "solver/app/command.hpp"
-#include "solver/app/command_line.hpp"
+#include "solver/app/cli/command.hpp"
+#include "solver/app/cli/command_line.hpp"
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // kuzure report: report.html, and a film, from what a run left.
 #include "solver/app/report/report.hpp"
-#include "solver/app/command.hpp"
+#include "solver/app/cli/command.hpp"
 #include "solver/app/report/movie.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

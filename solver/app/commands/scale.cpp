@@ -1,9 +1,9 @@
 // kuzure scale: the real cut of the real scene for any number of ranks, counted on one machine, and what a step of it
 // should take on a machine of jobs/machines. Runs nothing.
 #include "io/checkpoint.hpp"
-#include "solver/app/command.hpp"
-#include "solver/app/drift.hpp"
-#include "solver/app/predict.hpp"
+#include "solver/app/cli/command.hpp"
+#include "solver/app/scaling/drift.hpp"
+#include "solver/app/scaling/predict.hpp"
 #include "solver/run/simulation.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 // kuzure study: one scene over a table of settings; every point a child `kuzure run` in its own directory.
 #include "solver/app/study/study.hpp"
 #include "io/scene_file.hpp"
-#include "solver/app/command.hpp"
+#include "solver/app/cli/command.hpp"
 #include "solver/app/study/child.hpp"
 #include <CLI/CLI.hpp>
 #include <algorithm>

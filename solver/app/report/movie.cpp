@@ -1,6 +1,6 @@
 #include "solver/app/report/movie.hpp"
 #include "io/picture_series.hpp"
-#include "solver/app/program.hpp"
+#include "solver/app/cli/program.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cstring>

@@ -1,7 +1,7 @@
 #include "solver/app/study/dial.hpp"
 #include "io/scene_file.hpp"
 #include "io/scene_keys.hpp"
-#include "solver/app/forecast.hpp"
+#include "solver/app/scaling/forecast.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/fill.hpp"
 #include <algorithm>

@@ -1,6 +1,6 @@
 // The figures of a study: data and gnuplot scripts, drawn where gnuplot is there.
 #include "io/quote.hpp"
-#include "solver/app/program.hpp"
+#include "solver/app/cli/program.hpp"
 #include "solver/app/study/study.hpp"
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 #include "solver/app/study/study.hpp"
 #include "io/scene_file.hpp"
-#include "solver/app/estimate.hpp"
 #include "solver/app/report/record.hpp"
+#include "solver/app/scaling/estimate.hpp"
 #include "solver/scene/numbers.hpp"
 #include <algorithm>
 #include <charconv>

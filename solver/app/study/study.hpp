@@ -2,7 +2,7 @@
 // One scene over a table of settings: runs, errors, costs, and the table and figures they end in.
 #include "io/sweep_file.hpp"
 #include "solver/app/study/convergence.hpp"
-#include "solver/app/study/heap.hpp"
+#include "solver/app/study/profile.hpp"
 #include <array>
 #include <nlohmann/json_fwd.hpp>
 

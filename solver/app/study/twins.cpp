@@ -1,6 +1,6 @@
 #include "solver/app/study/twins.hpp"
 #include "solver/app/study/convergence.hpp"
-#include "solver/app/study/heap.hpp"
+#include "solver/app/study/profile.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/shape.hpp"
 #include <algorithm>

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Predicted against actual wall time of six scenes; run it on a quiet machine.
 
-    tests/prediction/prediction.py [PROGRAM] [--threads N]
+    perf/prediction.py [PROGRAM] [--threads N]
 
 Each scene is run as a user would run it; both times are those that `kuzure run` keeps in summary.json. Prints one line a scene
 and the median of |predicted/actual - 1|; exits 1 if that is above 20 %. About six minutes on two cores."""
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PLANE = """title = "plane column"
 dimensions = 2
 [space]

@@ -1,5 +1,5 @@
-#include "solver/app/predict.hpp"
-#include "solver/app/command.hpp"
+#include "solver/app/scaling/predict.hpp"
+#include "solver/app/cli/command.hpp"
 #include <cmath>
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 // How long a run will take here: a block of the scene's own soil stepped for a moment, times what the scene holds.
-#include "solver/app/estimate.hpp"
+#include "solver/app/scaling/estimate.hpp"
 
 namespace kuzure {
 

@@ -1,4 +1,4 @@
-#include "solver/app/estimate.hpp"
+#include "solver/app/scaling/estimate.hpp"
 #include "io/checkpoint.hpp"
 #include "io/snapshot.hpp"
 #include "solver/scene/check.hpp"

@@ -1,4 +1,4 @@
-#include "solver/app/signals.hpp"
+#include "solver/app/cli/signals.hpp"
 #include <csignal>
 #include <ctime>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-#include "solver/app/status.hpp"
+#include "solver/app/run/status.hpp"
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "solver/app/study/heap.hpp"
+#include "solver/app/study/profile.hpp"
 #include "solver/app/report/record.hpp"
 #include "solver/scene/material.hpp"
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "solver/app/measure.hpp"
+#include "solver/app/run/fronts.hpp"
 #include <algorithm>
 #include <limits>
 #include <map>

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""jobs/sweep.py on a tiny sweep: tables, plots, a split of the losses that adds up, resuming, and points as batch jobs."""
+"""jobs/scaling.py on a tiny scaling: tables, plots, a split of the losses that adds up, resuming, and points as batch jobs."""
 import csv, glob, json, os, re, shutil, subprocess, sys, tempfile
 
 program = os.path.abspath(sys.argv[1])
 root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-work = tempfile.mkdtemp(prefix="kuzure-sweep-")
+work = tempfile.mkdtemp(prefix="kuzure-scaling-")
 failures = []
 env = dict(os.environ, PATH=os.path.join(root, "tests/cluster") + ":" + os.environ["PATH"], OMPI_MCA_rmaps_base_oversubscribe="1", KUZURE_CORES="2",
            OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1")
@@ -16,11 +16,11 @@ def check(good, what):
         failures.append(what)
 
 
-def sweep(*args, expect=0, says=""):
-    done = subprocess.run(["/usr/bin/python3", os.path.join(root, "jobs/sweep.py"), *args, "--kuzure", program], capture_output=True, text=True, timeout=300,
+def scaling(*args, expect=0, says=""):
+    done = subprocess.run(["/usr/bin/python3", os.path.join(root, "jobs/scaling.py"), *args, "--kuzure", program], capture_output=True, text=True, timeout=300,
                           cwd=work, env=env)
     good = done.returncode == expect and says in done.stdout + done.stderr
-    check(good, f"sweep.py {' '.join(args)}: exit {done.returncode}, expected {expect} {'' if good else done.stderr[-600:]}")
+    check(good, f"scaling.py {' '.join(args)}: exit {done.returncode}, expected {expect} {'' if good else done.stderr[-600:]}")
     return done.stdout
 
 
@@ -71,7 +71,7 @@ scene = "block.toml"
 """
 try:
     write("strong.toml", STRONG)
-    said = sweep("strong.toml", "-o", "out")
+    said = scaling("strong.toml", "-o", "out")
     check("needs 3 cores" in said, "what does not fit the cores is named, not run")
     table = rows("out")
     check([r["point"] for r in table] == ["block-1x1", "block-2x1"] and all(r["runs"] == "2" for r in table), "a row a point, two repeats each")
@@ -99,18 +99,18 @@ try:
     stamps = lambda: {f: os.stat(f).st_mtime_ns for f in glob.glob(os.path.join(work, "out/*/run_*/summary.json"))}
     before = stamps()
     os.remove(os.path.join(work, "out/block-2x1/run_1/summary.json"))
-    sweep("strong.toml", "-o", "out")
+    scaling("strong.toml", "-o", "out")
     after = stamps()
     check(len(before) == 4 and [f for f in before if before[f] != after.get(f)] == [os.path.join(work, "out/block-2x1/run_1/summary.json")], "only what is missing runs again")
     write("strong.toml", STRONG.replace('set = ["time', 'set = ["output.history=0.001", "time'))
-    sweep("strong.toml", "-o", "out", "--quick")
+    scaling("strong.toml", "-o", "out", "--quick")
     check(all(int(r["steps"]) == 10 and r["runs"] == "1" for r in rows("out")), "--quick takes the smaller settings, and old points are run anew")
 
     # Output as a long run has it: two snapshots in 10 steps are charged as one in 1,000.
     write("rare.toml", STRONG.replace("repeats = 2", "repeats = 2\nsteps_per_output = 1000", 1))
     often = rows("out")[0]
     shutil.copytree(os.path.join(work, "out"), os.path.join(work, "rare"))
-    sweep("rare.toml", "-o", "rare", "--quick")
+    scaling("rare.toml", "-o", "rare", "--quick")
     with open(os.path.join(work, "rare/block-1x1/run_0/timers.json")) as f:
         once = json.load(f)["phases"]
     rare = 1e9 / 5120 * (once["history"]["seconds"]["mean"] + sum(once[p]["seconds"]["mean"] / once[p]["calls"] for p in ("snapshot", "checkpoint")) / 100)
@@ -119,7 +119,7 @@ try:
     # Tiles: twice the soil on twice the cores.
     write("weak.toml", 'title = "w"\nkind = "weak"\nset = ["time.end=0.001"]\n[[case]]\nseries = "t"\nscene = "block.toml"\nshare = 1\n'
           '[[case]]\nseries = "t"\nscene = "block.toml"\nshare = 2\ntiles = [2, 1]\n')
-    sweep("weak.toml", "-o", "weak")
+    scaling("weak.toml", "-o", "weak")
     check([(r["soil"], r["cores"]) for r in rows("weak")] == [("512", "1"), ("1024", "2")], "tiles repeat the soil sideways")
 
     # As batch jobs, through the stand-in of pjsub: first nothing, then submitted, then collected.
@@ -127,20 +127,20 @@ try:
         profile = re.sub(r"^ranks = \d+", "ranks = 1", re.sub(r"^cores = \d+", "cores = 1", f.read(), flags=re.M), flags=re.M)
     write("ofp.toml", profile)
     machine = ["strong.toml", "-o", "jobs", "--quick", "--machine", "./ofp.toml", "--account", "gz00"]
-    said = sweep(*machine, says="no point")
+    said = scaling(*machine, says="no point")
     check(said.count("pjsub /") == 2, "without --submit it says what to submit")
-    said = sweep(*machine, "--submit")
+    said = scaling(*machine, "--submit")
     check(said.count("submitted") == 2, "jobs are submitted")
     check([(r["nodes"], r["ranks"]) for r in rows("jobs")] == [("1", "1"), ("2", "2")], "and their points collected")
-    check("submitted" not in sweep(*machine, "--submit"), "once")
+    check("submitted" not in scaling(*machine, "--submit"), "once")
 
     # What is wrong.
     for old, new, says in [("repeats = 2", "repeat = 2", 'strong.toml:3: repeat: expected a known key, found "repeat"; did you mean "repeats"'), ('"strong"', '"stong"', "kind: expected"),
                            ("block.toml", "blok.toml", "found no file"), ("layouts = [[1, 1], [2, 1]", "layouts = [[1, 1], [1, 1]", "two points")]:
         write("strong.toml", STRONG.replace(old, new))
-        sweep("strong.toml", "-o", "bad", expect=2, says=says)
+        scaling("strong.toml", "-o", "bad", expect=2, says=says)
     write("strong.toml", STRONG.replace("time.end=0.001", "time.ned=0.001"))
-    sweep("strong.toml", "-o", "bad", "--quick", expect=4, says="time.ned")
+    scaling("strong.toml", "-o", "bad", "--quick", expect=4, says="time.ned")
 finally:
     shutil.rmtree(work)
 print(f"{len(failures)} failures")

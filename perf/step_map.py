@@ -2,7 +2,7 @@
 """The map of stable steps: the largest Courant number dt c_p/h at which a run keeps its energy, by bisection, for a bar, a
 column and a collapse, over viscosity, kernel and smoothing length.
 
-    tests/stability/step_map.py PROGRAM [FIGURE-DIRECTORY]
+    perf/step_map.py PROGRAM [FIGURE-DIRECTORY]
 
 Stable: the run ends by itself (exit 0) and its energy residual stays within 2 % of the largest energy at every row of its history.
 Writes step_map.csv to $KUZURE_RESULTS (or the working directory), where it also finds what an earlier call has done, and step_map.png to the figure directory."""

@@ -1,4 +1,4 @@
-#include "solver/app/sound_state.hpp"
+#include "solver/app/run/sound_state.hpp"
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "solver/app/command.hpp"
+#include "solver/app/cli/command.hpp"
 #include "decomposition/partition.hpp"
 #include "io/hdf5.hpp"
 #include "solver/core/ensure.hpp"

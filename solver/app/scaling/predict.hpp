@@ -1,7 +1,7 @@
 #pragma once
 // Seconds that a run will take on a machine of jobs/machines.
 #include "io/machine_profile.hpp"
-#include "solver/app/estimate.hpp"
+#include "solver/app/scaling/estimate.hpp"
 #include "solver/run/scaling.hpp"
 #include <span>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "solver/app/forecast.hpp"
+#include "solver/app/scaling/forecast.hpp"
 #include "solver/run/simulation.hpp"
 #include "solver/scene/check.hpp"
 #include <algorithm>

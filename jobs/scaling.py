@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""Strong and weak scaling: runs a sweep here, or as batch jobs, and reports where the efficiency goes.
+"""Strong and weak scaling: runs the points of a scaling file here, or as batch jobs, and reports where the efficiency goes.
 
-  jobs/sweep.py SWEEP.toml                            every point that fits the cores of this host, repeats in turn
-  jobs/sweep.py SWEEP.toml --quick                    the same with the sweep's smaller settings
-  jobs/sweep.py SWEEP.toml --machine NAME             batch scripts by `kuzure job`, one a point; report of what has finished
-  jobs/sweep.py SWEEP.toml --machine NAME --submit    and hand them to the batch system
+  jobs/scaling.py SCALING.toml                            every point that fits the cores of this host, repeats in turn
+  jobs/scaling.py SCALING.toml --quick                    the same with the smaller settings of its table [quick]
+  jobs/scaling.py SCALING.toml --machine NAME             batch scripts by `kuzure job`, one a point; report of what has finished
+  jobs/scaling.py SCALING.toml --machine NAME --submit    and hand them to the batch system
 
 Finished points are not run again: call it again after an interruption, or when batch jobs have ended. Leaves in DIR (default
-results/sweeps/NAME): points.csv, report.md, efficiency.svg/png, losses.svg/png, and every run's own directory.
-Exit codes as kuzure's: 0, 2 the sweep is wrong, 3 layouts of the same soil ended with different bits, 4 a run failed."""
+results/scaling/NAME): points.csv, report.md, efficiency.svg/png, losses.svg/png, and every run's own directory.
+Exit codes as kuzure's: 0, 2 the file is wrong, 3 layouts of the same soil ended with different bits, 4 a run failed."""
 import argparse, csv, difflib, json, math, os, re, shutil, statistics, subprocess, sys, tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -33,7 +33,7 @@ class Wrong(Exception):
     pass
 
 
-# ---------------------------------------------------------------------------------------------- the sweep file
+# ---------------------------------------------------------------------------------------------- the scaling file
 KEYS = {"": ["title", "kind", "repeats", "steps_per_output", "set", "here", "machine", "quick", "case"], "here": ["layouts", "threads"], "machine": ["nodes"],
         "quick": ["repeats", "set"], "case": ["series", "scene", "share", "tiles", "set"]}
 
@@ -63,12 +63,12 @@ def in_gnuplot(words):
     return "'" + "".join(c if c.isprintable() else " " for c in words).replace("'", "''") + "'"
 
 
-def read_sweep(path):
+def read_plan(path):
     try:
         with open(path, "rb") as f:
-            sweep = tomllib.load(f)
+            plan = tomllib.load(f)
     except (OSError, tomllib.TOMLDecodeError) as e:
-        raise Wrong(f"{path}: expected a sweep file: {e}")
+        raise Wrong(f"{path}: expected a scaling file: {e}")
 
     def check(table, where):
         for key in table:
@@ -81,16 +81,16 @@ def read_sweep(path):
             if not good:
                 raise Wrong(f"{path}: {where + '.' if where else ''}{key}: expected {what}, found {table[key]!r:.60}")
 
-    check(sweep, "")
+    check(plan, "")
     for where in ("here", "machine", "quick"):
-        check(sweep.get(where, {}), where)
-    if sweep.get("kind") not in ("strong", "weak"):
-        raise Wrong(f'{path}: kind: expected "strong" or "weak", found {sweep.get("kind")!r}')
-    if "title" not in sweep:
+        check(plan.get(where, {}), where)
+    if plan.get("kind") not in ("strong", "weak"):
+        raise Wrong(f'{path}: kind: expected "strong" or "weak", found {plan.get("kind")!r}')
+    if "title" not in plan:
         raise Wrong(f'{path}: title: expected title = "...", found nothing')
-    if not sweep.get("case"):
+    if not plan.get("case"):
         raise Wrong(f"{path}: case: expected [[case]] with scene, found nothing")
-    for case in sweep["case"]:
+    for case in plan["case"]:
         check(case, "case")
         if "scene" not in case:
             raise Wrong(f"{path}: case: expected scene = \"path\", found {case}")
@@ -100,9 +100,9 @@ def read_sweep(path):
         case.setdefault("series", os.path.splitext(os.path.basename(case["scene"]))[0])
         if not NAME.fullmatch(case["series"]):
             raise Wrong(f'{path}: case: series: the name of the scene file, {case["series"]!r}, is no name for directories; give series = "..."')
-        if sweep["kind"] == "weak" and "share" not in case:
+        if plan["kind"] == "weak" and "share" not in case:
             raise Wrong(f"{path}: case: share: expected the number of ranks of this case, found nothing")
-    return sweep
+    return plan
 
 
 def widened(scene, tiles):
@@ -115,12 +115,12 @@ def widened(scene, tiles):
     return [f"body.0.box.high={longer(body['high'])}", f"wall.0.box.high={longer(wall['high'])}"]
 
 
-def points_of(sweep, args, profile):
+def points_of(plan, args, profile):
     """One dictionary a point: name, series, scene, ranks, threads, nodes, cores, set."""
-    extra = sweep.get("quick", {}).get("set", []) if args.quick else []
+    extra = plan.get("quick", {}).get("set", []) if args.quick else []
     out = []
-    for k, case in enumerate(sweep["case"]):
-        sets = [*sweep.get("set", []), *extra, *case.get("set", [])]
+    for k, case in enumerate(plan["case"]):
+        sets = [*plan.get("set", []), *extra, *case.get("set", [])]
         if "tiles" in case:
             sets += widened(case["scene"], case["tiles"])
         series = case["series"]
@@ -129,19 +129,19 @@ def points_of(sweep, args, profile):
             node = profile["node"]
             per_node = node["ranks"]
             cores = node.get("cores") or len(os.sched_getaffinity(0))
-            counts = [case["share"]] if sweep["kind"] == "weak" else sweep.get("machine", {}).get("nodes", [1])
+            counts = [case["share"]] if plan["kind"] == "weak" else plan.get("machine", {}).get("nodes", [1])
             layouts = [(n, n * per_node, max(1, cores * node.get("threads_per_core", 1) // per_node), n * cores) for n in counts]
-        elif sweep["kind"] == "weak":
-            threads = sweep.get("here", {}).get("threads", 1)
+        elif plan["kind"] == "weak":
+            threads = plan.get("here", {}).get("threads", 1)
             layouts = [(1, case["share"], threads, case["share"] * threads)]
         else:
-            layouts = [(1, r, t, r * t) for r, t in sweep.get("here", {}).get("layouts", [[1, 1]])]
+            layouts = [(1, r, t, r * t) for r, t in plan.get("here", {}).get("layouts", [[1, 1]])]
         for nodes, ranks, threads, cores in layouts:
             name = f"{series}-{nodes}n{ranks}x{threads}" if profile else f"{series}-{ranks}x{threads}"
             out.append(dict(name=name, series=series, scene=case["scene"], nodes=nodes, ranks=ranks, threads=threads, cores=cores, set=sets))
     names = [p["name"] for p in out]
     if len(set(names)) < len(names):
-        raise Wrong(f"{args.sweep}: two points are called {next(n for n in names if names.count(n) > 1)}; give their cases different series")
+        raise Wrong(f"{args.plan}: two points are called {next(n for n in names if names.count(n) > 1)}; give their cases different series")
     return out
 
 
@@ -256,7 +256,7 @@ def costs(summary, timers, cores, steps_per_output):
     known = {p for members in GROUPS.values() for p in members} | {"setup"}
     unknown = [p for p in phases if p not in known]
     if unknown:
-        raise RuntimeError(f"timers.json has phases that no group of jobs/sweep.py counts: {unknown}")
+        raise RuntimeError(f"timers.json has phases that no group of jobs/scaling.py counts: {unknown}")
     # The mean rank waits for the slowest: at the reduction that ends every step, and before that for its halo.
     waiting = timers["pair_loop"]["seconds"]["max"] - timers["pair_loop"]["seconds"]["mean"]
     for g, wait in (("reductions", "reduce"), ("halo", "wait for halo")):
@@ -338,8 +338,8 @@ def percent(x):
     return f"{100 * x:.1f} %"
 
 
-def report(sweep, rows, points, out, where):
-    text = [f"# {sweep['title']}", "", f"{where}; {len(rows)} of {len(points)} points have results. Median of the repeats.", "",
+def report(plan, rows, points, out, where):
+    text = [f"# {plan['title']}", "", f"{where}; {len(rows)} of {len(points)} points have results. Median of the repeats.", "",
             "| point | nodes | ranks x threads | soil | ms a step (lowest..highest) | core-ns a particle and step | speed-up | efficiency | slowest rank / mean |",
             "|---|---|---|---|---|---|---|---|---|"]
     for r in rows:
@@ -357,8 +357,8 @@ def report(sweep, rows, points, out, where):
         text.append(f"| {r['point']} | {percent(1 - r['efficiency'])} | " + " | ".join(percent(r[f'lost {g}']) for g in GROUPS) + f" | {named} |")
     text += ["", "![losses](losses.svg)", "",
              "kernel: pair loops and update on the mean rank. imbalance: what the slowest rank computes longer than the mean, taken out of the waits. halo: packing,",
-             "ghost plans and what remains of the wait for halo. I/O: " + (f"snapshot, picture and checkpoint once in {sweep['steps_per_output']} steps, as in a long run, and history."
-             if sweep.get("steps_per_output") else "snapshots, pictures, checkpoint and history of these short runs, which begin and end with them."), ""]
+             "ghost plans and what remains of the wait for halo. I/O: " + (f"snapshot, picture and checkpoint once in {plan['steps_per_output']} steps, as in a long run, and history."
+             if plan.get("steps_per_output") else "snapshots, pictures, checkpoint and history of these short runs, which begin and end with them."), ""]
     hashes = {}
     for r in rows:
         hashes.setdefault((r["series"], r["soil"], r["steps"]), set()).add(r["hash"])
@@ -375,9 +375,9 @@ def report(sweep, rows, points, out, where):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sweep", metavar="SWEEP.toml")
+    parser.add_argument("plan", metavar="SCALING.toml")
     parser.add_argument("-o", dest="out", metavar="DIR")
-    parser.add_argument("--quick", action="store_true", help="the sweep's smaller settings")
+    parser.add_argument("--quick", action="store_true", help="the smaller settings of its table [quick]")
     parser.add_argument("--kuzure", default=os.path.join(ROOT, "build/release/kuzure"), metavar="PROGRAM")
     parser.add_argument("--machine", metavar="NAME", help="a profile of jobs/machines, or the path of one")
     parser.add_argument("--submit", action="store_true", help="hand the scripts to the batch system")
@@ -390,7 +390,7 @@ def main():
             raise Wrong("--submit: expected --machine NAME beside it")
         if not os.access(args.kuzure, os.X_OK):
             raise Wrong(f"{args.kuzure}: no program here; jobs/build.sh release kuzure, or --kuzure PROGRAM")
-        sweep = read_sweep(args.sweep)
+        plan = read_plan(args.plan)
         profile = None
         if args.machine:
             path = args.machine if "/" in args.machine or args.machine.endswith(".toml") else os.path.join(ROOT, "jobs/machines", args.machine + ".toml")
@@ -399,31 +399,31 @@ def main():
                     profile = tomllib.load(f)
             except (OSError, tomllib.TOMLDecodeError) as e:
                 raise Wrong(f"--machine {args.machine}: {e}")
-        name = os.path.splitext(os.path.basename(args.sweep))[0] + ("-quick" if args.quick else "")
+        name = os.path.splitext(os.path.basename(args.plan))[0] + ("-quick" if args.quick else "")
         if profile:
             name += "-" + os.path.splitext(os.path.basename(args.machine))[0]
-        out = os.path.abspath(args.out or os.path.join("results/sweeps", name))
-        points = points_of(sweep, args, profile)
-        repeats = 1 if profile else sweep.get("quick", {}).get("repeats", 1) if args.quick else sweep.get("repeats", 1)
+        out = os.path.abspath(args.out or os.path.join("results/scaling", name))
+        points = points_of(plan, args, profile)
+        repeats = 1 if profile else plan.get("quick", {}).get("repeats", 1) if args.quick else plan.get("repeats", 1)
         os.makedirs(out, exist_ok=True)
         if profile:
             make_jobs(points, out, args.kuzure, args, profile)
         else:
             run_here(points, repeats, out, args.kuzure)
-        rows = collected(points, repeats, out, sweep.get("steps_per_output"))
+        rows = collected(points, repeats, out, plan.get("steps_per_output"))
         if not rows:
-            print(f"no point of {args.sweep} has results yet")
+            print(f"no point of {args.plan} has results yet")
             return 0
         where = profile["title"] if profile else f"Host {os.uname().nodename}, {len(os.sched_getaffinity(0))} cores, {repeats} repeat{'s' if repeats > 1 else ''} in turn"
         draw(rows, out)
-        equal = report(sweep, rows, points, out, where)
+        equal = report(plan, rows, points, out, where)
         print(f"{len(rows)} of {len(points)} points: {os.path.join(out, 'report.md')}")
         return 0 if equal else 3
     except Wrong as e:
-        print(f"sweep.py: {e}", file=sys.stderr)
+        print(f"scaling.py: {e}", file=sys.stderr)
         return 2
     except RuntimeError as e:
-        print(f"sweep.py: {e}", file=sys.stderr)
+        print(f"scaling.py: {e}", file=sys.stderr)
         return 4
 
 

@@ -1,4 +1,4 @@
-#include "solver/app/program.hpp"
+#include "solver/app/cli/program.hpp"
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>

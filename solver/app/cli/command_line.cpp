@@ -1,4 +1,4 @@
-#include "solver/app/command_line.hpp"
+#include "solver/app/cli/command_line.hpp"
 #include "decomposition/comm.hpp"
 #include "io/file.hpp"
 #include "io/keys.hpp"

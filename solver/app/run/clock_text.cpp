@@ -1,5 +1,5 @@
-#include "solver/app/clock_text.hpp"
-#include "solver/app/command.hpp"
+#include "solver/app/run/clock_text.hpp"
+#include "solver/app/cli/command.hpp"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

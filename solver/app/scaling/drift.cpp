@@ -1,4 +1,4 @@
-#include "solver/app/drift.hpp"
+#include "solver/app/scaling/drift.hpp"
 #include <algorithm>
 #include <numeric>
 #include <omp.h>

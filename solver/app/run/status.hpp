@@ -1,6 +1,6 @@
 #pragma once
 // What a run says while it goes: one line that renews itself on a terminal, plain lines ever further apart in a log.
-#include "solver/app/measure.hpp"
+#include "solver/app/run/fronts.hpp"
 #include <cstdint>
 #include <optional>
 #include <string>
