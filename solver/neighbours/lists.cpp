@@ -97,57 +97,103 @@ Candidates of_walls(const WallPoints& w, Vector origin)
     return m;
 }
 
-/// One cluster's particles, in single precision.
+/// The box around one cluster's particles, in single precision.
 struct Cluster {
-    int n;
-    float x[16], y[16], z[16];
-    float lo[3], hi[3];
+    float lo[3] = {1e30f, 1e30f, 1e30f}, hi[3] = {-1e30f, -1e30f, -1e30f};
+    void add(const float (&p)[3])
+    {
+        for (int d = 0; d < 3; ++d) lo[d] = std::min(lo[d], p[d]), hi[d] = std::max(hi[d], p[d]);
+    }
 };
 
-/// Appends the candidates within reach of any particle of the cluster, in the global order. `out` must have room for
-/// `room` more; returns the new count.
-template <class Grow>
-std::size_t find(const Candidates& m, const Columns& columns, const Cluster& c, std::int32_t cx0, std::int32_t cx1, std::int32_t cy0,
-                 std::int32_t cy1, Vector origin, float reach, Array<Index>& out, std::size_t used, Grow grow)
-{
-    const float reach2 = reach * reach;
-    Narrow px[16], py[16], pz[16];
-    for (int k = 0; k < c.n; ++k) px[k] = Narrow(c.x[k]), py[k] = Narrow(c.y[k]), pz[k] = Narrow(c.z[k]);
-    for (std::int32_t cy = cy0; cy <= cy1; ++cy)
-        for (std::int32_t cx = cx0; cx <= cx1; ++cx) {
-            auto [begin, end] = m.range(cx, cy);
-            if (begin == end) continue;
-            // distance of the cluster's box to the column, in plan
-            const float left = float(columns.origin.x + cx * columns.width_x - origin.x), right = left + float(columns.width_x);
-            const float dx = std::max({0.f, left - c.hi[0], c.lo[0] - right});
-            float dy = 0;
-            if (!columns.flat) {
-                const float front = float(columns.origin.y + cy * columns.width_y - origin.y), back = front + float(columns.width_y);
-                dy = std::max({0.f, front - c.hi[1], c.lo[1] - back});
+/// For each pattern of eight hits: the places of those in front, and how many.
+struct Compress {
+    std::uint8_t at[256][8], count[256];
+    constexpr Compress() : at{}, count{}
+    {
+        for (int pattern = 0; pattern < 256; ++pattern) {
+            int n = 0;
+            for (int k = 0; k < 8; ++k)
+                if (pattern >> k & 1) at[pattern][n++] = std::uint8_t(k);
+            count[pattern] = std::uint8_t(n);
+            for (; n < 8; ++n) at[pattern][n] = 0;
+        }
+    }
+};
+constexpr Compress compress;
+
+/// Candidates of one set for the clusters of one column, from the lowest to the highest: where their heights begin and end in each column
+/// around moves on by little from one cluster to the next.
+class Finder {
+public:
+    Finder(const Candidates& m, const Columns& columns, Vector origin, float reach)
+        : m_(m), columns_(columns), origin_(origin), reach_(reach)
+    {
+    }
+
+    /// Around column (cx, cy), by rx and ry columns.
+    void enter(std::int32_t cx, std::int32_t cy, std::int32_t rx, std::int32_t ry)
+    {
+        around_.clear();
+        for (std::int32_t y = cy - ry; y <= cy + ry; ++y)
+            for (std::int32_t x = cx - rx; x <= cx + rx; ++x) {
+                const auto [begin, end] = m_.range(x, y);
+                if (begin == end) continue;
+                // left and front carry single-precision rounding: reach has the slack for it
+                const float left = float(columns_.origin.x + x * columns_.width_x - origin_.x);
+                const float front = columns_.flat ? -1e30f : float(columns_.origin.y + y * columns_.width_y - origin_.y);
+                around_.push_back({left, left + float(columns_.width_x), front, columns_.flat ? 1e30f : front + float(columns_.width_y),
+                                   begin, end, begin, begin});
             }
-            // left and front carry single-precision rounding: reach has the slack for it
-            const float rest = reach2 - dx * dx - dy * dy;
+    }
+    /// Appends what is within reach of the cluster's box, in the global order. `out` has `used` entries; returns the new count.
+    template <class Grow> std::size_t append(const Cluster& c, Array<Index>& out, std::size_t used, Grow grow)
+    {
+        const Narrow zero(0.0f), reach2(reach_ * reach_);
+        const Narrow x0(c.lo[0]), x1(c.hi[0]), y0(c.lo[1]), y1(c.hi[1]), z0(c.lo[2]), z1(c.hi[2]);
+        const float* z = m_.z.data();
+        for (Around& a : around_) {
+            // distance of the cluster's box to the column, in plan
+            const float dx = std::max({0.f, a.left - c.hi[0], c.lo[0] - a.right}),
+                        dy = std::max({0.f, a.front - c.hi[1], c.lo[1] - a.back});
+            const float rest = reach_ * reach_ - dx * dx - dy * dy;
             if (rest <= 0) continue;
-            const float dz = std::sqrt(rest);
-            const float* z = m.z.data();
-            begin = Index(std::lower_bound(z + begin, z + end, c.lo[2] - dz) - z);
-            end = Index(std::upper_bound(z + begin, z + end, c.hi[2] + dz) - z);
-            if (out.size() < used + std::size_t(end - begin) + narrow) grow(used + std::size_t(end - begin) + narrow);
+            const float dz = std::sqrt(rest), low = c.lo[2] - dz, high = c.hi[2] + dz;
+            while (a.begin > a.first && z[a.begin - 1] >= low) --a.begin;
+            while (a.begin < a.last && z[a.begin] < low) ++a.begin;
+            a.end = std::max(a.end, a.begin);
+            while (a.end > a.begin && z[a.end - 1] > high) --a.end;
+            while (a.end < a.last && z[a.end] <= high) ++a.end;
+            const std::size_t room = used + std::size_t(a.end - a.begin) + 16; // whole registers are written
+            if (out.size() < room) grow(room);
             Index* to = out.data();
-            for (Index q = begin; q < end; q += narrow) {
-                const Narrow x = load<Narrow>(&m.x[q]), y = load<Narrow>(&m.y[q]), zz = load<Narrow>(&m.z[q]);
-                Narrow nearest(1e30f);
-                for (int k = 0; k < c.n; ++k) {
-                    const Narrow a = x - px[k], b = y - py[k], d = zz - pz[k];
-                    nearest = min(fma(d, d, fma(b, b, a * a)), nearest);
+            for (Index q = a.begin; q < a.end; q += narrow) {
+                const Narrow x = load<Narrow>(&m_.x[q]), y = load<Narrow>(&m_.y[q]), h = load<Narrow>(&m_.z[q]);
+                const Narrow ax = max(max(x0 - x, x - x1), zero), ay = max(max(y0 - y, y - y1), zero), az = max(max(z0 - h, h - z1), zero);
+                unsigned hits = bits(less(fma(az, az, fma(ay, ay, ax * ax)), reach2));
+                if (a.end - q < narrow) hits &= (1u << (a.end - q)) - 1;
+                const Index* record = &m_.record[q];
+                for (int part = 0; part < narrow; part += 8, hits >>= 8) {
+                    const auto& at = compress.at[hits & 255];
+                    for (int k = 0; k < 8; ++k) to[used + std::size_t(k)] = record[part + at[k]];
+                    used += compress.count[hits & 255];
                 }
-                unsigned hits = bits(less(nearest, Narrow(reach2)));
-                if (end - q < narrow) hits &= (1u << (end - q)) - 1;
-                for (; hits; hits &= hits - 1) to[used++] = m.record[q + std::countr_zero(hits)];
             }
         }
-    return used;
-}
+        return used;
+    }
+
+private:
+    struct Around { // a column: its sides in plan, all its candidates, and those of the last cluster's heights
+        float left, right, front, back;
+        Index first, last, begin, end;
+    };
+    const Candidates& m_;
+    const Columns& columns_;
+    Vector origin_;
+    float reach_;
+    std::vector<Around> around_;
+};
 
 } // namespace
 
@@ -196,6 +242,9 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
         const int t = omp_get_thread_num();
         auto &out = soil_store_[t], &wall_out = wall_store_[t];
         std::size_t used = 0, wall_used = 0;
+        std::vector<Finder> finders;
+        finders.emplace_back(soil, columns, origin, slack_reach);
+        for (const auto& w : wall_points) finders.emplace_back(w, columns, origin, slack_reach);
         const auto grower = [](Array<Index>& a) {
             return [&a](std::size_t need) { a.resize(std::max(need, a.size() + a.size() / 2 + 4096)); };
         };
@@ -204,20 +253,18 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
             const std::int32_t cx = cols.x0 + std::int32_t(column % cols.nx), cy = cols.y0 + std::int32_t(column / cols.nx);
             Index begin = cols.start[column];
             const Index end = cols.start[column + 1];
+            if (begin == end) continue;
+            for (auto& f : finders) f.enter(cx, cy, rx, ry);
             for (Index c = cluster_start[column]; c < cluster_start[column + 1]; ++c, begin += width) {
+                const int members = int(std::min<Index>(width, end - begin));
                 Cluster cl;
-                cl.n = std::min<Index>(width, end - begin);
-                for (int d = 0; d < 3; ++d) cl.lo[d] = 1e30f, cl.hi[d] = -1e30f;
-                for (int k = 0; k < cl.n; ++k) {
-                    const float p[3] = {float(owned.x[begin + k] - origin.x), float(owned.y[begin + k] - origin.y),
-                                        float(owned.z[begin + k] - origin.z)};
-                    cl.x[k] = p[0], cl.y[k] = p[1], cl.z[k] = p[2];
-                    for (int d = 0; d < 3; ++d) cl.lo[d] = std::min(cl.lo[d], p[d]), cl.hi[d] = std::max(cl.hi[d], p[d]);
-                }
-                first_[c] = begin, count_[c] = std::int8_t(cl.n);
+                for (int k = 0; k < members; ++k)
+                    cl.add(
+                        {float(owned.x[begin + k] - origin.x), float(owned.y[begin + k] - origin.y), float(owned.z[begin + k] - origin.z)});
+                first_[c] = begin, count_[c] = std::int8_t(members);
                 place[c] = {t, used, wall_used};
                 const std::size_t before = used;
-                used = find(soil, columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach, out, used, grower(out));
+                used = finders[0].append(cl, out, used, grower(out));
                 n_soil_[c] = Index(used - before);
                 entries += used - before;
                 for (std::size_t k = before; k < used; ++k)
@@ -229,8 +276,7 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
                 for (std::size_t w = 0; w < walls.size(); ++w) {
                     if (wall_out.size() < wall_used + 2) grower(wall_out)(wall_used + 2);
                     const std::size_t head = wall_used;
-                    wall_used = find(wall_points[w], columns, cl, cx - rx, cx + rx, cy - ry, cy + ry, origin, slack_reach, wall_out,
-                                     wall_used + 2, grower(wall_out));
+                    wall_used = finders[w + 1].append(cl, wall_out, wall_used + 2, grower(wall_out));
                     const std::size_t found = wall_used - head - 2;
                     if (found == 0) {
                         wall_used = head;

@@ -1,7 +1,8 @@
-// Passes over a small jittered cloud, for counting instructions: instructions PASSES lanes|plain. Prints the directed pairs
+// Passes over a small jittered cloud, for counting instructions: instructions STEPS lanes|plain|staggered (two passes a step). Prints the directed pairs
 // of a pass. Compiled for x86-64-v3 whatever the machine, so that valgrind can run it and the count is the same everywhere.
 #include "perf/bench/cloud.hpp"
 #include "solver/kernels/leap_frog.hpp"
+#include "solver/kernels/staggered.hpp"
 #include "solver/scene/scene.hpp"
 #include <cstdio>
 #include <cstdlib>
@@ -30,5 +31,6 @@ int main(int argc, char** argv)
     };
     const auto scene = bench::dry_sand().interactions();
     if (std::strcmp(argv[2], "plain") == 0) run(LeapFrog<Bare, double>(scene));
+    else if (std::strcmp(argv[2], "staggered") == 0) run(Staggered<Bare, Native<double>>(scene));
     else run(LeapFrog<Bare, Native<double>>(scene));
 }

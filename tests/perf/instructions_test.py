@@ -51,7 +51,7 @@ if not program.exists():
 
 name = compiler()
 found = {}
-for how in ("lanes", "plain"):
+for how in ("lanes", "plain", "staggered"):
     few, pairs = counted(5, how)
     many, _ = counted(10, how)
     found[how] = round((many - few) / 5 / pairs, 2)
