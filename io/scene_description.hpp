@@ -330,6 +330,15 @@ template <class A> void describe(A& a, Scene& s)
                      });
              });
 
+    a.section("start",
+              {.fallback = "{}", .example = "{ from = \"results/settled\" }", .doc = "the state to start from", .role = Role::Bookkeeping});
+    a.text("start.from", s.start.from,
+           {.optional = true,
+            .example = "\"results/settled\"",
+            .doc = "start from the last state of another run (its result directory, or a checkpoint): places, velocities, densities, "
+                   "stresses and strains; time and displacement begin anew. Bodies, spacing and dimensions must be that run's; walls, "
+                   "effects, soils' numbers and accuracy may differ",
+            .role = Role::Bookkeeping});
     describe_effects(a, s.effects);
     describe_accuracy(a, s.accuracy);
     describe_output(a, s.output);

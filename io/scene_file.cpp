@@ -147,6 +147,10 @@ scene::Ready parse_ready_scene(std::string_view text, const std::string& name, s
     Reader reader(file);
     describe(reader, scene);
     file.throw_if_any();
+    // Paths count from the scene file's directory.
+    if (!scene.start.from.empty())
+        scene.start.from =
+            std::filesystem::absolute(std::filesystem::path(name).parent_path() / scene.start.from).lexically_normal().string();
 
     scene::resolve(scene);
     scene::Issues issues;

@@ -661,13 +661,14 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
                               text("its particles hold {:.2g} % {} mass than its volume would: lattice points and faces do not fit; a "
                                    "smaller space.spacing, or faces moved by part of one, come nearer",
                                    100 * std::abs(excess), excess > 0 ? "more" : "less"));
-        if (const auto why = no_closed_form(scene, *filling); !why.empty())
+        if (const auto why = scene.start.from.empty() ? no_closed_form(scene, *filling) : std::string(); !why.empty())
             scene.notes.push_back(
                 {"settling",
                  text("the stress \"at rest\" is no closed form: {}; the soil settles under damping before t = 0, about {:.0f} "
                       "steps",
                       why, steps_to_settle(scene, *filling)),
                  true});
+        if (!scene.start.from.empty()) scene.notes.push_back({"start", "from the last state of " + scene.start.from, true});
         const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",

@@ -53,6 +53,12 @@ struct Time {
     bool operator==(const Time&) const = default;
 };
 
+/// The state a run starts from, instead of bodies as they are drawn.
+struct Start {
+    std::string from; // result directory or checkpoint of another run, an absolute path; empty: none
+    bool operator==(const Start&) const = default;
+};
+
 } // namespace kuzure::scene
 
 namespace kuzure {
@@ -65,6 +71,7 @@ struct Scene {
     std::vector<scene::Soil> soils;
     std::vector<scene::Body> bodies;
     std::vector<scene::Wall> walls;
+    scene::Start start;
     scene::Effects effects;
     scene::Accuracy accuracy;
     scene::Output output;

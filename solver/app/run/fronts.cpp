@@ -92,4 +92,19 @@ Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const sc
     return {e[0], -e[1], e[2], -e[3], e[4], off};
 }
 
+double resting_volume_ratio(const Comm& comm, const Particles& p, const Scene& scene, const scene::Filling& filling)
+{
+    const double slow = 0.05 * std::sqrt(length(scene.effects.gravity.value_or(Vector{})) * scene.space.spacing);
+    // In whole units of 2^-32: the same sum on any ranks.
+    std::int64_t count = 0, sum = 0;
+    for (Index i = 0; i < p.size(); ++i) {
+        if (length(p[field::velocity][i]) > slow) continue;
+        const auto& body = scene.bodies[std::size_t(filling.body_of(p[field::id][i]))];
+        ++count, sum += std::llround(scene.soils[std::size_t(body.soil)].density / p[field::density][i] * 0x1p32);
+    }
+    count = comm.sum(count);
+    const double total = double(comm.sum(sum)) * 0x1p-32;
+    return count > 0 ? total / double(count) : 0;
+}
+
 } // namespace kuzure

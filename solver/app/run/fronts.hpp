@@ -17,4 +17,7 @@ struct Heap {
 /// Collective; heights count from the lowest soil at the start.
 Heap measure_heap(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 
+/// Collective. Mean rho_0/rho of the soil that rests, which moves slower than 0.05 sqrt(g spacing); 0 where none does.
+double resting_volume_ratio(const Comm&, const Particles&, const Scene&, const scene::Filling&);
+
 } // namespace kuzure
