@@ -4,6 +4,7 @@
 #include "io/quote.hpp"
 #include "solver/app/cli/command.hpp"
 #include "solver/app/cli/command_line.hpp"
+#include "solver/app/cli/help.hpp"
 #include "solver/app/cli/signals.hpp"
 #include <CLI/CLI.hpp>
 #include <cerrno>

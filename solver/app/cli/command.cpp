@@ -35,36 +35,6 @@ io::Path SceneArguments::results(const Scene& scene, const std::string& asked) c
     return io::Path("results") / io::Path(file).stem();
 }
 
-std::string other_writer(const io::Checkpoint& from)
-{
-    const auto header = nlohmann::json::parse(from.header, nullptr, false);
-    const std::string writer = header.is_object() ? header.value("version", std::string("an unnamed program")) : "an unnamed program";
-    return writer == version_text() ? "" : writer;
-}
-
-void require_same_scene(const Comm& comm, const io::Checkpoint& from, const Scene& scene)
-{
-    const std::string hash = io::scene_hash(scene);
-    if (from.scene_hash == hash) return;
-    const io::Place beside = io::directory_of(from.file) / "scene.toml";
-    std::string differs;
-    try {
-        if (comm.rank() == 0) differs = io::physics_difference(io::read_scene(beside.path(), {}, scene::StepLimit::Force), scene);
-    } catch (const std::runtime_error&) { // not there, or not readable any more: the hashes have to do
-    }
-    differs = comm.broadcast(differs);
-    std::string text = fmt::format("{}: this checkpoint belongs to another scene (hash {}, the scene given has {}). Expected: the same "
-                                   "physics; only title, time.end and [output] may change on a restart. ",
-                                   from.file.string(), from.scene_hash, hash);
-    const std::string writer = other_writer(from);
-    if (!differs.empty()) text += fmt::format("Different from {}: {}. Remedy: run with that scene.toml", beside.string(), differs);
-    else if (writer.empty()) text += "Remedy: the scene.toml beside the checkpoint";
-    else
-        text += fmt::format("It was written by {}; this is {}, which may know other keys. Remedy: go on with the program that wrote it",
-                            writer, version_text());
-    throw BadInput(text);
-}
-
 void complain(const std::string& text) noexcept
 {
     try {

@@ -1,7 +1,6 @@
 #pragma once
 // What the commands share: the team, the scene given on the command line, and how they are registered.
 #include "decomposition/comm.hpp"
-#include "io/checkpoint.hpp"
 #include "io/file.hpp"
 #include "io/scene_file.hpp"
 #include <functional>
@@ -10,9 +9,6 @@
 
 namespace CLI {
 class App;
-}
-namespace kuzure::io {
-struct PictureTask;
 }
 
 namespace kuzure {
@@ -32,14 +28,6 @@ struct SceneArguments {
     /// Where the results go: the directory asked for, or the scene's, or results/<scene file's name>.
     io::Path results(const Scene&, const std::string& asked) const;
 };
-
-/// Version, compiler and instruction set of the program that wrote a checkpoint; empty if it was this one.
-std::string other_writer(const io::Checkpoint&);
-/// Collective. Throws BadInput, with the keys that differ, where a checkpoint belongs to another scene.
-void require_same_scene(const Comm&, const io::Checkpoint&, const Scene&);
-
-/// The pictures that the scene asks for, or those by default where it asks for none, from the results in a directory.
-io::PictureTask picture_task(const Scene&, const io::Place& results);
 
 /// What kuzure check says of a scene. Collective.
 Exit tell_of_run(const Comm&, const SceneArguments&);

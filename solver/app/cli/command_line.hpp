@@ -1,7 +1,5 @@
 #pragma once
-// How the command line shows itself: pages of help that fit a screen, completions for shells, a manual page. All come from
-// CLI11's own tables of options.
-#include <initializer_list>
+// The command line as it was given: parsed, with words for what is wrong, and the same on all ranks.
 #include <string>
 #include <vector>
 
@@ -29,15 +27,5 @@ CommandLine parse(CLI::App&, int argc, char** argv);
 /// Collective. Throws BadInput on all ranks, with the lowest rank that is meant, where one of them was given a wrong command line or
 /// another one than rank 0.
 void agree_on(const Comm&, const CommandLine&);
-
-/// Help of at most 100 columns for the program and every command that is added after this.
-void fit_help_to_screen(CLI::App&);
-
-/// Puts options of a command under a heading of its help. Throws CLI::OptionNotFound where there is no such option.
-void under_heading(CLI::App& command, const char* heading, std::initializer_list<const char*> options);
-
-/// The completion script of "bash", "zsh" or "fish", or for "man" the manual page (roff), of the whole program. Throws BadInput
-/// for anything else.
-std::string completion(const CLI::App& program, const std::string& what);
 
 } // namespace kuzure

@@ -1,6 +1,6 @@
 // kuzure completion: scripts for shells, and the manual page. Not in the help: cmake --install calls it.
+#include "solver/app/cli/completion.hpp"
 #include "solver/app/cli/command.hpp"
-#include "solver/app/cli/command_line.hpp"
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 // kuzure job: a batch script for a machine of jobs/machines, to standard output.
 #include "io/quote.hpp"
 #include "solver/app/cli/command.hpp"
-#include "solver/app/cli/command_line.hpp"
+#include "solver/app/cli/help.hpp"
 #include "solver/app/scaling/predict.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include <CLI/CLI.hpp>

@@ -2,8 +2,8 @@
 #include "io/keys.hpp"
 #include "io/picture_series.hpp"
 #include "io/soil_color.hpp"
-#include "solver/app/cli/command.hpp"
-#include "solver/app/cli/command_line.hpp"
+#include "solver/app/cli/help.hpp"
+#include "solver/app/report/pictures.hpp"
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <fmt/format.h>
@@ -18,32 +18,7 @@ struct Arguments {
     int threads = 0;
 };
 
-constexpr std::uint64_t most_scene_bytes = (std::uint64_t(1) << 20) + 4096; // what a run adds included
-const std::vector<std::string> views{"oblique", "side", "top", "cut"};      // in the order of scene::View
-
-/// A result directory, held, and the scene in it. Throws BadInput where it is none.
-std::pair<io::Place, Scene> open_results(const Comm& comm, const io::Path& results)
-{
-    io::Place held;
-    std::string text, complaint;
-    io::on_root(comm, [&] {
-        std::error_code error;
-        if (!std::filesystem::is_directory(results, error))
-            throw BadInput(fmt::format("{}: expected the result directory of a run, found {}", results.string(),
-                                       std::filesystem::exists(results, error) ? "a file" : "nothing"));
-        held = io::hold(results);
-        if (!io::exists(held / "scene.toml"))
-            throw BadInput(fmt::format("{}: expected the result directory of a run, found no scene.toml in it", results.string()));
-        text = io::read_text(held / "scene.toml", most_scene_bytes);
-    });
-    try {
-        if (!held.held()) held = io::hold(results);
-    } catch (const IoFailed& e) {
-        complaint = e.what();
-    }
-    io::agree(comm, complaint);
-    return {held, io::parse_scene(comm.broadcast(text), (results / "scene.toml").string(), {}, scene::StepLimit::Force)};
-}
+const std::vector<std::string> views{"oblique", "side", "top", "cut"}; // in the order of scene::View
 
 Exit draw(const Comm& comm, const Arguments& a)
 {
@@ -89,17 +64,6 @@ Exit draw(const Comm& comm, const Arguments& a)
 }
 
 } // namespace
-
-io::PictureTask picture_task(const Scene& scene, const io::Place& results)
-{
-    const scene::Picture look = scene.output.picture.value_or(scene::Picture{});
-    io::PictureTask task;
-    task.results = results;
-    task.color = io::name_of(look.color);
-    task.view = look.view, task.range = look.range;
-    task.dimensions = scene.dimensions, task.spacing = scene.space.spacing, task.title = scene.title;
-    return task;
-}
 
 void add_picture(CLI::App& app, Action& chosen)
 {

@@ -1,0 +1,109 @@
+#include "solver/app/run/outputs.hpp"
+#include "io/soil_color.hpp"
+#include "solver/app/run/stop.hpp"
+#include <algorithm>
+#include <cmath>
+
+namespace kuzure {
+
+namespace {
+
+/// This rank's even share of all wall particles, for snapshots and pictures.
+io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const Material& first_soil)
+{
+    io::WallPoints w;
+    const std::int64_t n = f.wall_count(), first = f.soil_count();
+    const std::int64_t begin = n * comm.rank() / comm.size(), end = n * (comm.rank() + 1) / comm.size();
+    for (std::int64_t k = begin; k < end; ++k) {
+        w.position.push_back(f.wall_position(first + k));
+        w.id.push_back(first + k);
+        w.density.push_back(first_soil.density);
+    }
+    return w;
+}
+
+/// True if something that comes every `interval` s is due at this step and was not there at the one before.
+bool due(std::optional<double> interval, double time, double before)
+{
+    if (!interval) return false;
+    const auto count = [&](double t) { return std::floor(t / *interval * (1 + 1e-12) + 1e-9); };
+    return before < 0 || count(time) > count(before);
+}
+
+} // namespace
+
+Outputs::Outputs(const Comm& comm, const Scene& scene, const io::ResultDirectory& directory, const Simulation& sim,
+                 std::optional<double> restart, double start)
+    : comm_(comm), scene_(scene), directory_(directory), walls_(wall_share(comm, sim.filling(), sim.soils().front())), start_(start)
+{
+    open(restart);
+}
+
+void Outputs::open(std::optional<double> restart)
+{
+    snapshots_.emplace(comm_, directory_.snapshots(), restart);
+    history_.emplace(comm_, directory_.history(), scene_.dimensions, restart);
+    progress_.emplace(comm_, directory_.progress(), restart);
+}
+
+void Outputs::take_back(double time) { open(time); }
+
+void Outputs::begin_loop(const Simulation& sim)
+{
+    logged_step_ = sim.steps();
+    logged_wall_ = wall_clock() - start_;
+}
+
+void Outputs::write_due(Simulation& sim, double before, bool last)
+{
+    const double t = sim.time();
+    if (before < 0 || last || due(scene_.time.end / 400, t, before)) log_progress(sim);
+    if (due(scene_.output.history, t, before) || last || before < 0) {
+        if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(sim); });
+    }
+    if (due(scene_.output.every, t, before) || last || before < 0) {
+        if (!snapshots_->last_time() || t > *snapshots_->last_time()) sim.timers().timed(Phase::Snapshot, [&] { write_snapshot(sim, {}); });
+    }
+}
+
+void Outputs::log_progress(const Simulation& sim)
+{
+    const double wall = wall_clock() - start_;
+    const double rate = wall > logged_wall_ ? double(sim.steps() - logged_step_) / (wall - logged_wall_) : 0;
+    if (!progress_->last_time() || sim.time() > *progress_->last_time())
+        progress_->append(
+            {sim.time(), sim.steps(), sim.dt(), wall, sim.steps() > logged_step_ ? rate : std::nan(""), sim.balance().imbalance()});
+    logged_wall_ = wall, logged_step_ = sim.steps();
+}
+
+void Outputs::write_history(Simulation& sim)
+{
+    const Ledger l = sim.ledger();
+    heap_ = measure_heap(comm_, sim.particles(), scene_, sim.filling());
+    const Heap& heap = *heap_;
+    residual_ = sim.residual(l);
+    // energy.cpp's sums, and the columns they and the heap read
+    const auto n = double(sim.particles().size());
+    sim.timers().did(Phase::History, 45 * n, 20 * 8 * n);
+    history_->append({sim.time(), sim.steps(), sim.dt(), l.state.kinetic, l.state.potential, l.state.elastic, l.dissipated.plastic,
+                      l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_, sim.max_speed(), heap.height, heap.min_x,
+                      heap.max_x, heap.min_y, heap.max_y, l.dissipated.stabilising, 0.0});
+}
+
+void Outputs::write_snapshot(const Simulation& sim, std::optional<std::int64_t> failed)
+{
+    io::SnapshotLabel label{sim.time(), sim.steps(), scene_.dimensions, scene_.title, scene_.output.fields, failed};
+    // What colours the pictures is kept, asked for or not.
+    if (scene_.output.picture && !label.fields.empty())
+        if (const std::string behind = io::field_behind(scene_.output.picture->color); std::ranges::count(label.fields, behind) == 0)
+            label.fields.push_back(behind);
+    snapshots_->write(sim.particles(), walls_, label);
+}
+
+void Outputs::write_failure(const Simulation& sim)
+{
+    // Its picture has a ring around the particle to blame.
+    if (!snapshots_->last_time() || sim.time() > *snapshots_->last_time()) write_snapshot(sim, sim.failed_id());
+}
+
+} // namespace kuzure

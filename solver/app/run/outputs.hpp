@@ -1,0 +1,50 @@
+#pragma once
+// What a run writes while it goes: history.csv, the snapshots, progress.csv, each at the first step at or after its time.
+#include "io/history.hpp"
+#include "io/result_directory.hpp"
+#include "io/snapshot.hpp"
+#include "solver/app/run/fronts.hpp"
+#include "solver/run/simulation.hpp"
+#include <optional>
+
+namespace kuzure {
+
+class Outputs {
+public:
+    /// Collective. `restart`: the simulated time (s) from which a run goes on: what lies behind it is taken back. `start`: wall_clock()
+    /// when the run began.
+    Outputs(const Comm&, const Scene&, const io::ResultDirectory&, const Simulation&, std::optional<double> restart, double start);
+    /// The steps to come count for the rate in progress.csv.
+    void begin_loop(const Simulation&);
+    /// Collective: what is due after a step that began at time `before` (s; negative: there was none).
+    void write_due(Simulation&, double before, bool last);
+    /// Collective: the state whose numbers failed, unless it is kept already.
+    void write_failure(const Simulation&);
+    /// Collective: forgets what was written after a time (s), to which the simulation went back.
+    void take_back(double time);
+    /// The history is on the disk as far as it goes.
+    void sync() { history_->sync(); }
+    /// Of the last row of the history; nothing before there is one.
+    const std::optional<double>& residual() const { return residual_; }
+    const std::optional<Heap>& heap() const { return heap_; }
+
+private:
+    void open(std::optional<double> restart);
+    void write_history(Simulation&);
+    void write_snapshot(const Simulation&, std::optional<std::int64_t> failed);
+    void log_progress(const Simulation&);
+
+    const Comm& comm_;
+    const Scene& scene_;
+    const io::ResultDirectory& directory_;
+    io::WallPoints walls_;
+    std::optional<io::Snapshots> snapshots_;
+    std::optional<io::History> history_;
+    std::optional<io::ProgressLog> progress_;
+    std::optional<double> residual_;
+    std::optional<Heap> heap_;
+    double start_, logged_wall_ = 0; // s: of wall_clock(), since start_
+    std::int64_t logged_step_ = 0;
+};
+
+} // namespace kuzure

@@ -1,0 +1,170 @@
+#include "solver/app/study/runner.hpp"
+#include "io/scene_file.hpp"
+#include "solver/app/study/child.hpp"
+#include "solver/app/study/study.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <chrono>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace kuzure::study {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void say(const std::string& text)
+{
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+}
+
+/// What point.json says of a run that was done before, where it is the same run.
+bool take_what_is_there(const io::Path& folder, Point& p)
+{
+    try {
+        const auto j = Json::parse(io::read_text(folder / "point.json"));
+        if (j.at("scene_hash") != p.hash || j.at("end") != p.scene->time.end || j.at("exit_code") != 0) return false;
+        p.core_seconds = j.at("core_seconds");
+    } catch (const std::exception&) {
+        return false; // not done, or not whole
+    }
+    p.exit_code = 0, p.resumed = true;
+    return true;
+}
+
+class StudyRun {
+public:
+    StudyRun(const Comm& comm, const StudyArguments& a) : comm_(comm), args_(a), out_(a.output) {}
+
+    Exit go()
+    {
+        if (comm_.size() > 1)
+            throw BadInput("kuzure study starts its runs itself: start it without mpirun; --threads or `threads` in the sweep gives each "
+                           "run its threads");
+        const std::string text = io::read_scene_text(args_.sweep);
+        study_ = plan(io::parse_sweep(text, args_.sweep));
+        if (std::filesystem::exists(out_) && !std::filesystem::is_directory(out_))
+            throw BadInput(fmt::format("{}: expected a directory, found a file; choose another with -o DIR", out_.string()));
+        std::error_code error;
+        // A sweep.toml alone may be the user's own.
+        const bool ours = std::filesystem::exists(out_ / "sweep.toml", error) && std::filesystem::is_directory(out_ / "points", error);
+        if (std::filesystem::is_directory(out_) && !std::filesystem::is_empty(out_, error) && !ours)
+            throw BadInput(fmt::format(
+                "{}: expected a new directory or that of a study, found one with other things in it; choose another with -o DIR",
+                out_.string()));
+        std::filesystem::create_directories(out_ / "points", error);
+        io::write_atomically(out_ / "sweep.toml", text);
+        const int threads = args_.threads > 0 ? args_.threads : study_.sweep.threads;
+
+        // The cheap ones first: they show early what is wrong, and teach what the others will take.
+        std::vector<Point*> todo;
+        for (auto& p : study_.points) {
+            if (!p.scene) continue;
+            if (!take_what_is_there(folder(p), p)) todo.push_back(&p);
+        }
+        std::stable_sort(todo.begin(), todo.end(), [](const auto* a, const auto* b) { return a->predicted_pairs < b->predicted_pairs; });
+        const auto done = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return p.resumed; });
+        say(fmt::format("{}: {} points, {} already there, {} to run, {} thread{} each", study_.sweep.title, study_.points.size(), done,
+                        todo.size(), threads, threads > 1 ? "s" : ""));
+        double pairs_left = 0, pairs_done = 0, seconds_done = 0;
+        for (const auto* p : todo) pairs_left += p->predicted_pairs;
+        const auto begin = std::chrono::steady_clock::now();
+        for (std::size_t k = 0; k < todo.size(); ++k) {
+            Point& p = *todo[k];
+            if (args_.max_minutes > 0 && std::chrono::steady_clock::now() - begin > std::chrono::duration<double>(60 * args_.max_minutes)) {
+                p.message = "not run yet: --max-minutes are over; the same command goes on";
+                continue;
+            }
+            const std::string head = fmt::format("[{}/{}] {}, {:g} m", k + 1, todo.size(), p.asked.curve, p.spacing);
+            // Another point of the same scene may have been run meanwhile.
+            if (take_what_is_there(folder(p), p)) {
+                say(head + ": the same scene as a point before");
+            } else if (!run(p, threads)) {
+                say("stopped on request; the same command goes on from here");
+                return Exit::Stopped;
+            } else {
+                pairs_done += p.predicted_pairs, seconds_done += p.core_seconds;
+                const double left = pairs_done > 0 ? seconds_done / pairs_done * (pairs_left - p.predicted_pairs) / threads : 0;
+                say(fmt::format("{}: {}{}", head,
+                                p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds)
+                                                 : fmt::format("exit {}: {}", p.exit_code, p.message),
+                                k + 1 < todo.size() ? left < 100 ? fmt::format("; about {:.0f} s left", left)
+                                                                 : fmt::format("; about {:.1f} minutes left", left / 60)
+                                                    : ""));
+            }
+            pairs_left -= p.predicted_pairs;
+        }
+
+        for (auto& p : study_.points) {
+            if (!p.finished()) continue;
+            const auto damaged = [&](const std::exception& e) {
+                return IoFailed(
+                    fmt::format("{}: damaged results ({}). Remedy: remove this directory; the same command runs the point again",
+                                folder(p).string(), e.what()));
+            };
+            try {
+                measure(study_, p, folder(p) / "run");
+            } catch (const nlohmann::json::exception& e) {
+                throw damaged(e);
+            } catch (const std::out_of_range& e) {
+                throw damaged(e);
+            }
+        }
+        compare(study_);
+        const auto problems = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return !p.finished(); });
+        io::write_atomically(out_ / "study.json", to_json(study_).dump(1) + "\n");
+        io::write_atomically(out_ / "study.csv", to_csv(study_));
+        say("\n" + to_text(study_));
+        say(draw(study_, out_ / "figures"));
+        say(fmt::format("{}; {} of {} points without result; results in {}", problems ? "done" : "all points done", problems,
+                        study_.points.size(), out_.string()));
+        return Exit::Ok;
+    }
+
+private:
+    io::Path folder(const Point& p) const { return out_ / "points" / p.folder; }
+
+    /// False if this program was asked to stop.
+    bool run(Point& p, int threads)
+    {
+        const io::Path here = folder(p);
+        std::error_code error;
+        std::filesystem::remove_all(here, error);
+        std::filesystem::create_directories(here, error);
+        io::write_atomically(here / "scene.toml", io::write_scene(*p.scene));
+        const auto child = run_child(
+            {"run", (here / "scene.toml").string(), "-o", (here / "run").string(), "--threads", std::to_string(threads), "--quiet"},
+            here / "log.txt");
+        if (child.stopped) return false;
+        p.exit_code = child.exit_code, p.core_seconds = child.core_seconds;
+        // Only the results count: a checkpoint of each of many points would fill the disk.
+        for (const char* name : {"checkpoint.h5", "checkpoint.prev.h5"}) std::filesystem::remove(here / "run" / name, error);
+        if (p.exit_code != 0) {
+            std::string log = io::read_text(here / "log.txt");
+            while (!log.empty() && log.back() == '\n') log.pop_back();
+            p.message = log.substr(log.rfind('\n') + 1);
+        }
+        io::write_atomically(here / "point.json", Json{{"scene_hash", p.hash},
+                                                       {"end", p.scene->time.end},
+                                                       {"exit_code", p.exit_code},
+                                                       {"core_seconds", p.core_seconds},
+                                                       {"threads", threads},
+                                                       {"version", version_text()}}
+                                                          .dump(1) +
+                                                      "\n");
+        return true;
+    }
+
+    const Comm& comm_;
+    StudyArguments args_;
+    io::Path out_;
+    Study study_;
+};
+
+} // namespace
+
+Exit run_study(const Comm& comm, const StudyArguments& a) { return StudyRun(comm, a).go(); }
+
+} // namespace kuzure::study
