@@ -163,7 +163,7 @@ void print(const std::vector<Case>& cases, const Scene& s, const StepPlace& at, 
                    1e3 * c.step.recut, 1e3 * c.slow_messages.total(), 1e3 * c.thin_wires.total());
     for (const Case& c : cases)
         if (c.cut.scattered > 0) fmt::print("\n{} ranks: {} of them have soil in several pieces\n", c.ranks, c.cut.scattered);
-    fmt::print("\nThe counts are those of a run's first step; times are by the model of docs/scaling.md.\n");
+    fmt::print("\nThe counts are those of a run's first step; times are by the model of docs/performance.md.\n");
 }
 
 Exit scale(const Comm& comm, const Arguments& a)
