@@ -6,6 +6,7 @@
 #include "solver/app/report/movie.hpp"
 #include "solver/app/report/pictures.hpp"
 #include "solver/app/report/report.hpp"
+#include "solver/app/run/fronts.hpp"
 #include "solver/app/run/stop.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/core/simd.hpp"
@@ -43,6 +44,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     const Ledger l = sim.ledger();
     const std::int64_t steps_here = sim.steps() - facts_.first_step;
     const double stepping = facts_.loop_seconds;
+    warn_of_volume(sim);
     io::Summary s;
     s.wall_seconds = wall_clock() - facts_.start;
     s.status = status, s.exit_code = int(code), s.scene_hash = facts_.scene_hash, s.version = version_text();
@@ -74,6 +76,13 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
     j["retries"] = facts_.retries;
     j["peak_speed"] = facts_.peak_speed;
+    if (!facts_.started_from.is_null()) j["started_from"] = facts_.started_from;
+    if (const auto& settled = sim.settled())
+        j["settling"] = {{"why", settled->why},        {"steps", settled->steps},        {"seconds", settled->time},
+                         {"speed", settled->speed},    {"moved", settled->displacement}, {"held", settled->held},
+                         {"at_rest", settled->at_rest}};
+    const double volume = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
+    if (volume > 0) j["resting_volume_ratio"] = volume;
     if (outputs.heap()) j["soil_off_ground"] = outputs.heap()->off_ground;
     if (facts_.with_twins && code == Exit::Ok) {
         io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, directory_.path(), facts_.peak_speed, facts_.twins); });
@@ -82,6 +91,23 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     }
     io::write_json(comm_, directory_.summary(), j);
     write_timers(sim);
+}
+
+/// Without dilation soil keeps its volume: more, where it rests, is not the soil's doing.
+void Ending::warn_of_volume(const Simulation& sim)
+{
+    constexpr double most = 1.02;
+    for (const auto& soil : scene_.soils)
+        if (soil.dilation_angle > 0) return;
+    const double ratio = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
+    if (ratio > most)
+        messages_.warn(fmt::format(
+            "the soil at rest takes {:.1f} % more space than at the start, though it does not dilate: heights and reach "
+            "are too great by about that{}",
+            100 * (ratio - 1),
+            std::ranges::any_of(scene_.soils, [](const scene::Soil& s) { return s.opened_volume == scene::OpenedVolume::Forgotten; })
+                ? "; soil.*.opened_volume = \"kept\" would close what tension has opened"
+                : ""));
 }
 
 void Ending::write_timers(Simulation& sim)

@@ -21,6 +21,7 @@ struct RunFacts {
     double peak_speed = 0;       // m/s, over all steps of all legs
     Forecast forecast;
     std::vector<nlohmann::ordered_json> retries;
+    nlohmann::ordered_json started_from; // checkpoint and time (s) of another run, or null
     bool with_twins = false;
     std::vector<study::TwinRun> twins;
 };
@@ -41,6 +42,7 @@ public:
 
 private:
     void draw_pictures(Simulation&);
+    void warn_of_volume(const Simulation&);
     void write_timers(Simulation&);
     void write_report();
 

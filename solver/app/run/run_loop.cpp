@@ -4,6 +4,7 @@
 #include "solver/app/run/ending.hpp"
 #include "solver/app/run/outputs.hpp"
 #include "solver/app/run/sound_state.hpp"
+#include "solver/app/run/start_state.hpp"
 #include "solver/app/run/stop.hpp"
 #include "solver/app/run/twin_runs.hpp"
 #include "solver/app/scaling/estimate.hpp"
@@ -29,7 +30,12 @@ public:
     Exit go()
     {
         try {
-            open();
+            try {
+                open();
+            } catch (const SettlingStopped& e) {
+                messages_.say_aloud(fmt::format("{}; nothing was written. Run it again", e.what()));
+                return Exit::Stopped;
+            }
             if (args_.twins) {
                 auto twins =
                     run_twins(comm_, args_, scene_, *directory_, messages_, facts_.start,
@@ -76,7 +82,7 @@ private:
         if (from) {
             restart_time = go_on(*from, here, std::move(options));
         } else {
-            sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options)); // what it refuses leaves nothing behind
+            start(std::move(options)); // what it refuses leaves nothing behind
             directory_->make(args_.restart ? io::Existing::MoveAside : existing);
             if (!directory_->moved_to().empty())
                 messages_.say(fmt::format("the old results are now in {}", directory_->moved_to().string()));
@@ -126,6 +132,38 @@ private:
             messages_.warn(
                 fmt::format("this checkpoint was written by {}; this is {}: the bits from here on may be others", writer, version_text()));
         return clock.time;
+    }
+
+    /// The simulation at t = 0: from the state of another run where the scene names one, else settled where the soil has to. Throws
+    /// SettlingStopped where it is asked to stop meanwhile.
+    void start(RunOptions options)
+    {
+        if (!scene_.start.from.empty()) {
+            StartState state = start_state(comm_, scene_, *options.filling);
+            messages_.say(fmt::format("starting from {}, t = {:g} s there", state.from, state.time));
+            facts_.started_from = {{"checkpoint", state.from}, {"time", state.time}};
+            options.start = std::move(state.particles);
+        }
+        StopRequests stop(comm_, args_, scene_, *directory_, facts_.start);
+        double said = wall_clock();
+        options.settling = [&](const Settling& s) {
+            if (const double now = wall_clock(); now - said > 2) {
+                said = now;
+                messages_.say(fmt::format("settling: step {}, largest speed {:.2g} m/s", s.steps, s.speed));
+            }
+            return stop.now().stop;
+        };
+        sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(options));
+        if (const auto& s = sim_->settled()) {
+            messages_.say(words_of(*s));
+            if (!s->at_rest) messages_.warn(words_of(*s));
+        }
+    }
+    static std::string words_of(const Settling& s)
+    {
+        return fmt::format("settled before t = 0: {} steps, moved by up to {:.2g} m, largest speed {:.2g} m/s{}{}", s.steps, s.displacement,
+                           s.speed, s.held ? "; this soil does not stand by itself: it was held until it starts" : "",
+                           s.at_rest ? "" : "; it was not at rest yet");
     }
 
     void write_scene()
