@@ -4,7 +4,7 @@
 --quick    coarse runs, under three minutes: for every day
 --slow     also the expensive ends: V-EXP-1 at 1 mm, V-EXP-3 at a = 20
 --known    a gate that known.py lists, with its reason, may be missed: what tests ask for. One that is met must leave the list
---publish  write docs/verification.md and docs/figures instead of a page among the results
+--publish  write the measured part of docs/verification.md and docs/figures instead of a page among the results
 Exit status 1 if a gate is missed or a negative control passes, or a run fails; every case runs all the same.
 """
 import os, sys, time
