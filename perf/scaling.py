@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The figures of docs/scaling.md, one command each:
+"""The figures of docs/performance.md, one command each:
     perf/scaling.py weak      the paper's three cases on Oakforest-PACS: predicted efficiency and where it goes, for 1, 4, 32 ranks a node
     perf/scaling.py series    the same height, tiled sideways, up to 8,208 nodes: predicted efficiency, time and memory of the cut
     perf/scaling.py balance   max/mean of pair work from real cuts, at the start and, with --from DIR, later in hirata_52

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Fuzzing of the scene reader and the checkpoint reader with libFuzzer, ASan and UBSan (docs/reliability.md). Needs clang, which
+# Fuzzing of the scene reader and the checkpoint reader with libFuzzer, ASan and UBSan (docs/verification.md). Needs clang, which
 # jobs/install.sh does not install: apt-get install clang libclang-rt-dev
 #   tests/fuzz.sh scene|checkpoint EXECUTIONS   so many more; corpus and logs in build/fuzz/, which grow from run to run
 #   tests/fuzz.sh count                         executions of all runs so far, by their logs; those that go on count too

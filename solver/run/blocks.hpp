@@ -28,7 +28,7 @@ inline double list_reach(const Scene& s) { return s.support() * (1 + s.accuracy.
 /// What a step of a set of particles consists of. Pairs are directed, soil i <- j closer than the support.
 struct StepWork {
     std::int64_t particles = 0, soil_pairs = 0, wall_pairs = 0;
-    // A wall pair and a particle's update in units of a soil pair: docs/scaling.md
+    // A wall pair and a particle's update in units of a soil pair: docs/performance.md
     static constexpr double wall = 2, particle = 11;
     double pairs() const { return double(soil_pairs) + wall * double(wall_pairs); }
     double total() const { return pairs() + particle * double(particles); }

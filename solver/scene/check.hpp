@@ -8,7 +8,7 @@
 namespace kuzure::scene {
 
 /// dt c_p/h above which a scheme is unstable by theory (staggered; of kernel, h and viscosity) or nearly every run fails
-/// (leap-frog); docs/stability.md has the map of stable steps.
+/// (leap-frog); docs/verification.md has the map of stable steps.
 double courant_limit(const Scene&);
 /// What is refused unless the user insists, and up to where columns and collapses kept their energy; above it a warning.
 double unstable_courant(const Scene&);

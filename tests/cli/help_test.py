@@ -56,11 +56,28 @@ def dead_links(file, text):
             if "://" not in link and not (file.parent / link).exists()]
 
 
+def anchors(text):
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)
+    return {re.sub(r"[^\w\- ]", "", h.lower()).strip().replace(" ", "-") for h in headings}
+
+
+def dead_anchors(file, text):
+    """Links to a heading that its page does not have."""
+    dead = []
+    for link, anchor in re.findall(r"\]\(([^)#\s]*)#([^)\s]+)\)", text):
+        page = file.parent / link if link else file
+        if "://" not in link and anchor not in anchors(page.read_text() if link and page.exists() else text):
+            dead.append(f"{link}#{anchor}")
+    return dead
+
+
 # The checks must be able to fail.
 assert too_large("x\n" * 51) and too_large("x" * 101) and not too_large(("x" * 100 + "\n") * 50)
 assert len(wrong_commands("```sh\nkuzure fly a.toml\nkuzure run a.toml --fast # --x\n```\nand `kuzure run --slow`",
                           {"run": {"--set"}})) == 3
 assert dead_links(ROOT / "README.md", "[a](no/such.md) [b](LICENSE)") == ["no/such.md"]
+assert dead_anchors(ROOT / "README.md", "# `A b`: c, d\n[a](#a-b-c-d) [b](#no) [c](docs/README.md#documents) [d](docs/README.md#no)") == ["#no", "docs/README.md#no"]
 
 main_page = say("--help")
 check(not too_large(main_page), f"kuzure --help: {too_large(main_page)}")
@@ -104,12 +121,14 @@ with tempfile.TemporaryDirectory() as folder:
 
 check((ROOT / "docs/scene.md").read_text() == say("reference"),
       f"docs/scene.md is not what the program says: {PROGRAM} reference > docs/scene.md")
-for file in [ROOT / "README.md", ROOT / "README.ja.md", ROOT / "ARCHITECTURE.md", *sorted((ROOT / "docs").glob("*.md"))]:
+for file in [ROOT / "README.md", ROOT / "README.ja.md", ROOT / "ARCHITECTURE.md", ROOT / "perf/JOURNAL.md", *sorted((ROOT / "docs").glob("*.md"))]:
     text = file.read_text()
     for wrong in wrong_commands(text, {**options, "completion": {"--help"}}):  # not in the help
         check(False, f"{file.relative_to(ROOT)}: {wrong}")
     for link in dead_links(file, text):
         check(False, f"{file.relative_to(ROOT)}: no file {link}")
+    for link in dead_anchors(file, text):
+        check(False, f"{file.relative_to(ROOT)}: no heading {link}")
 
 for what in FAILED:
     print(what)

@@ -169,7 +169,7 @@ std::string to_text(const std::vector<Case>& cases, const Scene& s, const StepPl
             1e3 * c.step.recut, 1e3 * c.slow_messages.total(), 1e3 * c.thin_wires.total());
     for (const Case& c : cases)
         if (c.cut.scattered > 0) add("\n{} ranks: {} of them have soil in several pieces\n", c.ranks, c.cut.scattered);
-    add("\nThe counts are those of a run's first step; times are by the model of docs/scaling.md.\n");
+    add("\nThe counts are those of a run's first step; times are by the model of docs/performance.md.\n");
     return text;
 }
 

@@ -18,13 +18,13 @@ io::MachineProfile machine_named(const std::string& name_or_path)
 
 namespace {
 
-// What the model assumes beside a machine's constants; each is explained in docs/scaling.md.
+// What the model assumes beside a machine's constants; each is explained in docs/performance.md.
 constexpr double rim_per_seen = 1.5;     // a cluster waits as a whole when one of its particles does
 constexpr double steps_per_rebuild = 17; // hirata_52: 579 rebuilds in 10,000 steps
 constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, places of ghosts
 constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
-// Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/scaling.md).
+// Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
 constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
 constexpr double even_sweeps = 55;      // numbers told to all peers, each with a sum over all ranks
 constexpr double even_rounds = 11;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
@@ -34,7 +34,7 @@ constexpr double state_bytes = 252;     // of a particle that migrates
 constexpr double scalar_ns_here = 59;   // particle_ns of the machine where even_seconds was measured
 
 /// Growth of max/mean - 1 a step while soil slides, for a mean rank's soil: smaller parts are crossed sooner. Fitted to
-/// `perf/scaling.py drift` on 4, 16, 32 and 64 ranks (docs/scaling.md).
+/// `perf/scaling.py drift` on 4, 16, 32 and 64 ranks (docs/performance.md).
 double drift(double particles) { return 6.1e-5 * std::pow(35152 / std::max(1.0, particles), 0.56); }
 
 } // namespace

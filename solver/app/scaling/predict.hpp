@@ -22,7 +22,7 @@ struct RankLoad {
     double node_rows = 0;            // between this rank's node and others, the larger of both ways, of all its ranks
 };
 
-/// Seconds of one step by the model of docs/scaling.md; the slowest rank counts.
+/// Seconds of one step by the model of docs/performance.md; the slowest rank counts.
 struct StepSeconds {
     double pairs = 0;       // pair pass of the mean rank
     double particles = 0;   // lists, sorting, records of the mean rank
