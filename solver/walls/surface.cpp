@@ -1,6 +1,8 @@
 #include "solver/walls/surface.hpp"
 #include "solver/scene/shape.hpp"
+#include <algorithm>
 #include <limits>
+#include <numbers>
 
 namespace kuzure {
 
@@ -10,6 +12,13 @@ namespace {
 struct Candidate {
     Vector point, normal;
 };
+
+/// Where faces of two walls meet in one edge, that with more grip counts.
+double grip(const scene::Wall& w)
+{
+    if (w.surface == scene::Surface::Rough) return std::numbers::pi;
+    return w.surface == scene::Surface::Coulomb ? w.friction_angle : -1; // below pi/2
+}
 
 double clamped(double x, double low, double high) { return std::min(std::max(x, low), high); }
 
@@ -100,14 +109,19 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
                     const Vector normal = depth - std::fabs(straight) <= tolerance_ ? c.normal : (1 / depth) * way;
                     if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
                     if (covered(c.point + part.shift + tolerance_ * normal)) return;
-                    for (const Face& f : found)
-                        if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) return;
+                    for (Face& f : found)
+                        if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) {
+                            if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall;
+                            return;
+                        }
                     found.push_back({normal, depth, part.wall});
                 });
             },
             scene_.walls[part.wall].shape);
     }
-    std::stable_sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return a.depth < b.depth - tolerance_; });
+    // Of equally near ones that which looks up, then along x, then y: how the ground is drawn does not show.
+    const auto rank = [&](const Face& f) { return f.depth - tolerance_ * dot(f.normal, {0.1, 0.01, 1}); };
+    std::sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return rank(a) < rank(b); });
 }
 
 double WallSurface::depth(Vector point, double reach) const
