@@ -116,6 +116,20 @@ inline double grip(const scene::Wall& w)
 {
     return w.surface == scene::Surface::Rough ? std::numbers::pi : w.surface == scene::Surface::Coulomb ? w.friction_angle : -1;
 }
+/// True if all that lies across the way to an edge is ground: a hundredth of a spacing beside it, and a little back.
+inline bool folds(const Ground& ground, Vector edge, Vector way)
+{
+    const auto cross = [](Vector a, Vector b) { return Vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
+    const Vector any = std::fabs(way.y) < 0.5 ? Vector{0, 1, 0} : Vector{1, 0, 0};
+    const Vector a = (1 / length(cross(any, way))) * cross(any, way), b = cross(way, a);
+    const double pi = std::numbers::pi;
+    for (int k = 0; k < 8; ++k) {
+        const double turn = k * pi / 4, p = std::cos(turn), q = ground.dimensions == 2 ? 0 : std::sin(turn);
+        if (std::fabs(p) < 0.1 && ground.dimensions == 2) continue;
+        if (!ground.holds(edge + ground.spacing * (1e-2 * (p * a + q * b) - 5e-6 * way))) return false;
+    }
+    return true;
+}
 /// Exposed faces no further than `reach` from x, a point inside the ground, nearest first.
 inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const scene::Wall> walls, Vector x, double reach)
 {
@@ -131,6 +145,8 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
             const Vector normal = straight ? on.normal : (1 / depth) * way;
             if (depth > least && dot(way, normal) < 0) continue;   // seen from behind
             if (ground.holds(on.point + least * normal)) continue; // covered
+            // An edge counts where the ground folds about it: the surface does not go on to where it is nearer.
+            if (!straight && !folds(ground, on.point, normal)) continue;
             const auto same = std::ranges::find_if(
                 all, [&](const Face& f) { return std::fabs(f.depth - depth) <= least && dot(f.normal, normal) > 1 - 1e-9; });
             if (same == all.end()) all.push_back({normal, depth, part.wall});

@@ -88,6 +88,24 @@ bool WallSurface::covered(Vector x) const
     return false;
 }
 
+bool WallSurface::continued(Vector edge, Vector way) const
+{
+    const Vector across = dimensions_ == 2         ? Vector{-way.z, 0, way.x}
+                          : std::fabs(way.z) < 0.8 ? Vector{-way.y, way.x, 0}
+                                                   : Vector{0, -way.z, way.y};
+    const Vector a = (1 / length(across)) * across;
+    const Vector b{way.y * a.z - way.z * a.y, way.z * a.x - way.x * a.z, way.x * a.y - way.y * a.x};
+    const double step = 1e4 * tolerance_, diagonal = std::sqrt(0.5);
+    const Vector from = edge - 5 * tolerance_ * way;
+    const auto air = [&](double p, double q) { return !covered(from + step * (p * a + q * b)); };
+    if (air(1, 0) || air(-1, 0)) return true;
+    if (dimensions_ == 2) return false;
+    for (const double p : {-diagonal, diagonal})
+        for (const double q : {-diagonal, diagonal})
+            if (air(p, q)) return true;
+    return air(0, 1) || air(0, -1);
+}
+
 void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) const
 {
     found.clear();
@@ -109,6 +127,7 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
                     const Vector normal = depth - std::fabs(straight) <= tolerance_ ? c.normal : (1 / depth) * way;
                     if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
                     if (covered(c.point + part.shift + tolerance_ * normal)) return;
+                    if (depth - std::fabs(straight) > tolerance_ && continued(c.point + part.shift, normal)) return;
                     for (Face& f : found)
                         if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) {
                             if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall;
