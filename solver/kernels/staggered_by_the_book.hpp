@@ -116,19 +116,22 @@ inline double grip(const scene::Wall& w)
 {
     return w.surface == scene::Surface::Rough ? std::numbers::pi : w.surface == scene::Surface::Coulomb ? w.friction_angle : -1;
 }
-/// True if all that lies across the way to an edge is ground: a hundredth of a spacing beside it, and a little back.
+/// True if all that lies across the way to an edge is ground, a hundredth of a spacing beside it and a little back: along the axes, in
+/// which most pieces end, and around.
 inline bool folds(const Ground& ground, Vector edge, Vector way)
 {
     const auto cross = [](Vector a, Vector b) { return Vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
-    const Vector any = std::fabs(way.y) < 0.5 ? Vector{0, 1, 0} : Vector{1, 0, 0};
-    const Vector a = (1 / length(cross(any, way))) * cross(any, way), b = cross(way, a);
-    const double pi = std::numbers::pi;
-    for (int k = 0; k < 8; ++k) {
-        const double turn = k * pi / 4, p = std::cos(turn), q = ground.dimensions == 2 ? 0 : std::sin(turn);
-        if (std::fabs(p) < 0.1 && ground.dimensions == 2) continue;
-        if (!ground.holds(edge + ground.spacing * (1e-2 * (p * a + q * b) - 5e-6 * way))) return false;
+    const Vector c = cross(way, std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0}), a = (1 / length(c)) * c, b = cross(way, a);
+    std::vector<Vector> beside{{1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}};
+    if (ground.dimensions == 3) {
+        beside.insert(beside.end(), {{0, 1, 0}, {0, -1, 0}});
+        for (int k = 0; k < 16; ++k) beside.push_back(std::cos(k * std::numbers::pi / 8) * a + std::sin(k * std::numbers::pi / 8) * b);
     }
-    return true;
+    return std::ranges::all_of(beside, [&](Vector along) {
+        const Vector across = along - dot(along, way) * way;
+        const double l = length(across);
+        return l <= 1e-3 || ground.holds(edge + ground.spacing * ((1e-2 / l) * across - 5e-6 * way));
+    });
 }
 /// Exposed faces no further than `reach` from x, a point inside the ground, nearest first.
 inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const scene::Wall> walls, Vector x, double reach)
@@ -138,10 +141,11 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
     for (const auto& part : ground.parts)
         for (const OnFace& on : nearest_on_each_face(part.shape, x, ground.dimensions)) {
             const Vector way = on.point - x;
-            const double depth = length(way);
-            if (depth > reach) continue;
             // Beside a face its edge is nearest, and the surface faces the way to it.
-            const bool straight = depth - std::fabs(dot(way, on.normal)) <= least;
+            const double away = length(way), along = std::fabs(dot(way, on.normal));
+            const bool straight = away - along <= least;
+            const double depth = straight ? along : away;
+            if (depth > reach) continue;
             const Vector normal = straight ? on.normal : (1 / depth) * way;
             if (depth > least && dot(way, normal) < 0) continue;   // seen from behind
             if (ground.holds(on.point + least * normal)) continue; // covered

@@ -90,20 +90,24 @@ bool WallSurface::covered(Vector x) const
 
 bool WallSurface::continued(Vector edge, Vector way) const
 {
-    const Vector across = dimensions_ == 2         ? Vector{-way.z, 0, way.x}
-                          : std::fabs(way.z) < 0.8 ? Vector{-way.y, way.x, 0}
-                                                   : Vector{0, -way.z, way.y};
-    const Vector a = (1 / length(across)) * across;
-    const Vector b{way.y * a.z - way.z * a.y, way.z * a.x - way.x * a.z, way.x * a.y - way.y * a.x};
-    const double step = 1e4 * tolerance_, diagonal = std::sqrt(0.5);
+    // Air beside the edge, across the way to it: along the axes, in which most pieces end, and around.
     const Vector from = edge - 5 * tolerance_ * way;
-    const auto air = [&](double p, double q) { return !covered(from + step * (p * a + q * b)); };
-    if (air(1, 0) || air(-1, 0)) return true;
+    const auto air = [&](Vector along) {
+        const Vector across = along - dot(along, way) * way;
+        const double l = length(across);
+        return l > 1e-3 && !covered(from + (1e4 * tolerance_ / l) * across);
+    };
+    for (const double side : {-1.0, 1.0})
+        if (air({side, 0, 0}) || air({0, 0, side}) || (dimensions_ == 3 && air({0, side, 0}))) return true;
     if (dimensions_ == 2) return false;
-    for (const double p : {-diagonal, diagonal})
-        for (const double q : {-diagonal, diagonal})
-            if (air(p, q)) return true;
-    return air(0, 1) || air(0, -1);
+    const Vector any = std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0};
+    const Vector c{way.y * any.z - way.z * any.y, way.z * any.x - way.x * any.z, way.x * any.y - way.y * any.x}, a = (1 / length(c)) * c;
+    const Vector b{way.y * a.z - way.z * a.y, way.z * a.x - way.x * a.z, way.x * a.y - way.y * a.x};
+    for (int k = 0; k < 16; ++k) {
+        const double turn = k * std::numbers::pi / 8;
+        if (air(std::cos(turn) * a + std::sin(turn) * b)) return true;
+    }
+    return false;
 }
 
 void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) const
@@ -120,14 +124,15 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
                 for_each_face(shape, x, dimensions_, [&](const Candidate& c) {
                     Vector way = c.point - x;
                     if (dimensions_ == 2) way.y = 0;
-                    const double depth = length(way);
-                    if (depth > reach) return;
                     // Beside the foot of the perpendicular an edge is closest: the surface faces the way to it.
-                    const double straight = dot(way, c.normal);
-                    const Vector normal = depth - std::fabs(straight) <= tolerance_ ? c.normal : (1 / depth) * way;
+                    const double away = length(way), along = std::fabs(dot(way, c.normal));
+                    const bool straight = away - along <= tolerance_;
+                    const double depth = straight ? along : away;
+                    if (depth > reach) return;
+                    const Vector normal = straight ? c.normal : (1 / depth) * way;
                     if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
                     if (covered(c.point + part.shift + tolerance_ * normal)) return;
-                    if (depth - std::fabs(straight) > tolerance_ && continued(c.point + part.shift, normal)) return;
+                    if (!straight && continued(c.point + part.shift, normal)) return;
                     for (Face& f : found)
                         if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) {
                             if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall;
