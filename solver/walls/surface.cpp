@@ -1,6 +1,8 @@
 #include "solver/walls/surface.hpp"
 #include "solver/scene/shape.hpp"
+#include <algorithm>
 #include <limits>
+#include <numbers>
 
 namespace kuzure {
 
@@ -10,6 +12,13 @@ namespace {
 struct Candidate {
     Vector point, normal;
 };
+
+/// Where faces of two walls meet in one edge, that with more grip counts.
+double grip(const scene::Wall& w)
+{
+    if (w.surface == scene::Surface::Rough) return std::numbers::pi;
+    return w.surface == scene::Surface::Coulomb ? w.friction_angle : -1; // below pi/2
+}
 
 double clamped(double x, double low, double high) { return std::min(std::max(x, low), high); }
 
@@ -79,6 +88,28 @@ bool WallSurface::covered(Vector x) const
     return false;
 }
 
+bool WallSurface::continued(Vector edge, Vector way) const
+{
+    // Air beside the edge, across the way to it: along the axes, in which most pieces end, and around.
+    const Vector from = edge - 5 * tolerance_ * way;
+    const auto air = [&](Vector along) {
+        const Vector across = along - dot(along, way) * way;
+        const double l = length(across);
+        return l > 1e-3 && !covered(from + (1e4 * tolerance_ / l) * across);
+    };
+    for (const double side : {-1.0, 1.0})
+        if (air({side, 0, 0}) || air({0, 0, side}) || (dimensions_ == 3 && air({0, side, 0}))) return true;
+    if (dimensions_ == 2) return false;
+    const Vector any = std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0};
+    const Vector c{way.y * any.z - way.z * any.y, way.z * any.x - way.x * any.z, way.x * any.y - way.y * any.x}, a = (1 / length(c)) * c;
+    const Vector b{way.y * a.z - way.z * a.y, way.z * a.x - way.x * a.z, way.x * a.y - way.y * a.x};
+    for (int k = 0; k < 16; ++k) {
+        const double turn = k * std::numbers::pi / 8;
+        if (air(std::cos(turn) * a + std::sin(turn) * b)) return true;
+    }
+    return false;
+}
+
 void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) const
 {
     found.clear();
@@ -93,21 +124,28 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
                 for_each_face(shape, x, dimensions_, [&](const Candidate& c) {
                     Vector way = c.point - x;
                     if (dimensions_ == 2) way.y = 0;
-                    const double depth = length(way);
-                    if (depth > reach) return;
                     // Beside the foot of the perpendicular an edge is closest: the surface faces the way to it.
-                    const double straight = dot(way, c.normal);
-                    const Vector normal = depth - std::fabs(straight) <= tolerance_ ? c.normal : (1 / depth) * way;
+                    const double away = length(way), along = std::fabs(dot(way, c.normal));
+                    const bool straight = away - along <= tolerance_;
+                    const double depth = straight ? along : away;
+                    if (depth > reach) return;
+                    const Vector normal = straight ? c.normal : (1 / depth) * way;
                     if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
                     if (covered(c.point + part.shift + tolerance_ * normal)) return;
-                    for (const Face& f : found)
-                        if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) return;
+                    if (!straight && continued(c.point + part.shift, normal)) return;
+                    for (Face& f : found)
+                        if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) {
+                            if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall;
+                            return;
+                        }
                     found.push_back({normal, depth, part.wall});
                 });
             },
             scene_.walls[part.wall].shape);
     }
-    std::stable_sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return a.depth < b.depth - tolerance_; });
+    // Of equally near ones that which looks up, then along x, then y: how the ground is drawn does not show.
+    const auto rank = [&](const Face& f) { return f.depth - tolerance_ * dot(f.normal, {0.1, 0.01, 1}); };
+    std::sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return rank(a) < rank(b); });
 }
 
 double WallSurface::depth(Vector point, double reach) const

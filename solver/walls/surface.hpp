@@ -30,6 +30,8 @@ private:
         scene::Box bounds;
     };
     bool covered(Vector x) const;
+    /// True where the surface goes on beyond an edge towards a point that sees it along `way`: that is nearer, the edge no face.
+    bool continued(Vector edge, Vector way) const;
 
     const Scene& scene_;
     int dimensions_;

@@ -1,120 +1,17 @@
 // Every fast pass against solver/kernels/by_the_book.hpp: every compiled model, in 3-D and 2-D, plain, in lanes and in mixed precision,
 // on lattice, jitter, disorder and hard arrangements, alone and beside walls of every shape and surface.
 #include "solver/kernels/by_the_book.hpp"
-#include "solver/kernels/variants.hpp"
+#include "tests/unit/clouds.hpp"
 #include "tests/unit/run_pass.hpp"
 #include <gtest/gtest.h>
 #include <numbers>
 
 using namespace kuzure;
-using bench::Cloud;
+using namespace kuzure::measured;
 using book::operator+;
 using book::operator*;
 
 namespace {
-
-// ---- scenes: one for every compiled model ----------------------------------------------------------------------------
-template <int I> Scene scene_of(int dimensions)
-{
-    using M = std::tuple_element_t<I, Variants>;
-    using K = typename M::Kernel;
-    Scene s = bench::dry_sand();
-    s.accuracy.scheme = scene::Scheme::LeapFrog;
-    s.dimensions = dimensions;
-    s.accuracy.kernel = std::is_same_v<K, CubicSpline>  ? scene::Kernel::CubicSpline
-                        : std::is_same_v<K, WendlandC2> ? scene::Kernel::WendlandC2
-                                                        : scene::Kernel::WendlandC4;
-    const bool linear = std::is_same_v<decltype(M::viscosity), LinearViscosity>;
-    s.effects.viscosity.reset();
-    if (M::viscous) s.effects.viscosity = scene::Viscosity{0.1, linear ? 0 : 0.5};
-    if (M::tensile) s.effects.artificial_stress = scene::ArtificialStress{0.5, 2.55};
-    if (M::diffusive) s.effects.stress_diffusion = scene::StressDiffusion{0.1};
-    if (M::corrected) s.accuracy.correction = scene::Correction::Gradient;
-    return s;
-}
-/// True if the scene gets this very model.
-template <int I> bool first_to_cover(const Scene& s)
-{
-    return [&]<int... J>(std::integer_sequence<int, J...>) { return !(std::tuple_element_t<J, Variants>::covers(s.interactions()) || ...); }
-    (std::make_integer_sequence<int, I>{}) && std::tuple_element_t<I, Variants>::covers(s.interactions());
-}
-std::vector<Scene> scenes()
-{
-    std::vector<Scene> all;
-    [&]<int... I>(std::integer_sequence<int, I...>)
-    {
-        const auto add = [&](const Scene& s, bool its_own) {
-            EXPECT_TRUE(its_own) << "a compiled model that no scene here gets";
-            all.push_back(s);
-        };
-        (add(scene_of<I>(3), first_to_cover<I>(scene_of<I>(3))), ...);
-        (add(scene_of<I>(2), first_to_cover<I>(scene_of<I>(2))), ...);
-    }
-    (std::make_integer_sequence<int, KUZURE_VARIANTS>{});
-    return all;
-}
-/// A scene with every term, in Wendland C2, and pore water whose table bends over the cloud.
-Scene everything(int dimensions)
-{
-    Scene s = scene_of<KUZURE_VARIANTS - 2>(dimensions);
-    s.effects.pore_pressure = scene::PorePressure{{{0.05, 0.2}, {0.2, 0.1}}, 1000};
-    return s;
-}
-
-// ---- walls beside the cloud, which fills 0 .. edge() -------------------------------------------------------------------
-constexpr double dx = 0.04;
-int count(int dimensions) { return dimensions == 2 ? 13 : 6; }
-double edge(int dimensions) { return count(dimensions) * dx; }
-
-const char* const shapes[] = {"box", "cylinder", "sphere", "polygon"};
-scene::Shape shape(int kind, int dimensions)
-{
-    const double e = edge(dimensions), middle = e / 2;
-    switch (kind) {
-    case 0: // a floor that ends in the middle
-        return scene::Box{{-2 * dx, -dx, -3 * dx}, {e - 2 * dx, e + dx, 0}};
-    case 1: // upright beside the cloud and as high as half of it
-        return scene::Cylinder{{-3.1 * dx, middle, -2 * dx}, 4.2 * dx, 5 * dx};
-    case 2: // reaches in from below
-        return scene::Sphere{{middle, middle, -4.3 * dx}, 5 * dx};
-    default: // a slope with a corner inwards and one outwards, whose end face stands in the cloud
-        return scene::Polygon{{{-4 * dx, -4 * dx}, {e, -4 * dx}, {e, 2 * dx}, {0.7 * e, 1.7 * dx}, {0.4 * e, 0}, {0, 0}, {-4 * dx, 2 * dx}},
-                              {-3 * dx, 0.6 * e}};
-    }
-}
-const char* const surfaces[] = {"rough", "smooth", "Coulomb"};
-scene::Wall wall(int kind, int surface, int dimensions)
-{
-    return {shape(kind, dimensions), scene::Surface(surface), surface == 2 ? 0.35 : 0};
-}
-std::vector<scene::Wall> corner(int dimensions)
-{
-    const double e = edge(dimensions);
-    return {{scene::Box{{-3 * dx, -dx, -3 * dx}, {e, e + dx, 0}}, scene::Surface::Coulomb, 0.4},
-            {scene::Box{{-3 * dx, -dx, 0}, {0, e + dx, e}}, scene::Surface::Smooth, 0}};
-}
-
-// ---- clouds ------------------------------------------------------------------------------------------------------------
-enum Arrangement { Lattice, Jitter, Disorder, Hard, Creep, Soils };
-const char* const arrangements[] = {"lattice", "jitter", "disorder", "hard", "creep", "two soils"};
-/// A sorted cloud. Hard: lonely, coincident and tensile particles. Creep: so slow that it sticks to a Coulomb wall.
-Cloud cloud(Arrangement kind, Scene s)
-{
-    if (kind == Soils) s.soils.push_back({"clay", 1500, 4e6, 0.25, 3e3, 0.35, 0.1, scene::Cone::Compression, {}, {}, {}, {}});
-    Cloud c(count(s.dimensions), kind == Lattice ? 0.0 : kind == Disorder ? 1.5 : 0.3, s, 7);
-    auto& p = c.particles;
-    if (kind == Hard) {
-        p[field::position].set(3, Vector{50, s.dimensions == 2 ? 0.0 : 50, 50});
-        p[field::position].set(5, p[field::position][4]);
-        for (Index i = 20; i < 100; ++i) p[field::stress].set(i, Stress{300, -50, 20, s.dimensions == 2 ? 0.0 : 10, -40, 5});
-    }
-    for (Index i = 0; i < p.size(); ++i) {
-        if (kind == Creep) p[field::velocity].set(i, 3e-4 * p[field::velocity][i]);
-        if (kind == Soils && i % 3 == 0) p[field::soil].set(i, 1), p[field::density].set(i, 1500.0 / 1850 * p[field::density][i]);
-    }
-    c.sort();
-    return c;
-}
 
 // ---- the book's side ---------------------------------------------------------------------------------------------------
 constexpr double damping = 0.7; // 1/s
@@ -228,7 +125,7 @@ void expect_by_the_book(const Cloud& c, const Read& read, const std::string& wha
 
 TEST(ByTheBook, EveryModelFarFromWalls)
 {
-    for (const Scene& s : scenes())
+    for (const Scene& s : scenes(scene::Scheme::LeapFrog))
         for (int kind = Lattice; kind <= Soils; ++kind) {
             if (kind == Creep) continue;
             const Cloud c = cloud(Arrangement(kind), s);
@@ -239,7 +136,7 @@ TEST(ByTheBook, EveryModelFarFromWalls)
 TEST(ByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
 {
     int stick = 0, slip = 0, between = 0, off = 0, arrangement = 0;
-    for (const Scene& bare : scenes()) {
+    for (const Scene& bare : scenes(scene::Scheme::LeapFrog)) {
         for (int kind = 0; kind < 4; ++kind)
             for (int surface = 0; surface < 3; ++surface) {
                 if (bare.dimensions == 2 && kind == 1) continue; // no cylinder in 2-D
@@ -269,7 +166,7 @@ TEST(ByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
 TEST(ByTheBook, PoreWaterAndNoGravity)
 {
     for (const int dimensions : {2, 3}) {
-        Scene s = everything(dimensions);
+        Scene s = everything(dimensions, scene::Scheme::LeapFrog);
         expect_by_the_book(cloud(Jitter, s), by_the_book(cloud(Jitter, s)), "pore water");
         s.walls = corner(dimensions);
         expect_by_the_book(cloud(Soils, s), by_the_book(cloud(Soils, s)), "pore water, corner, two soils");
@@ -331,7 +228,7 @@ TEST(ByTheBook, NoticesAPlantedFaultInTheWalls)
 {
     for (const int dimensions : {2, 3})
         for (int surface = 0; surface < 3; ++surface) {
-            Scene s = everything(dimensions);
+            Scene s = everything(dimensions, scene::Scheme::LeapFrog);
             s.walls = {wall(2, surface, dimensions)};
             const Cloud c = cloud(Jitter, s);
             const std::string what = std::string(surfaces[surface]) + ", " + std::to_string(dimensions) + "-D";
@@ -359,7 +256,7 @@ TEST(ByTheBook, NoticesAPlantedFaultInTheWalls)
 TEST(ByTheBook, NoticesAPlantedFaultInEveryTerm)
 {
     for (const int dimensions : {2, 3}) {
-        const Scene s = everything(dimensions);
+        const Scene s = everything(dimensions, scene::Scheme::LeapFrog);
         const Cloud c = cloud(Hard, s);
         const auto planted = [&](const char* fault, auto change) {
             Scene mistaken = s;
@@ -382,7 +279,7 @@ TEST(ByTheBook, NoticesAPlantedFaultInEveryTerm)
 // Each of the nine components of L, and its transpose, is seen.
 TEST(ByTheBook, NoticesAFaultInAnyComponentOfL)
 {
-    Scene s = everything(3);
+    Scene s = everything(3, scene::Scheme::LeapFrog);
     s.walls = {wall(3, 2, 3)};
     const Cloud c = cloud(Jitter, s);
     const auto pass = measured::run_pass(c, Arithmetic::Simd, damping);
@@ -405,7 +302,7 @@ TEST(ByTheBook, AWallLawIsOneFunctionExchanged)
 {
     const double e = edge(3);
     for (int surface = 0; surface < 3; ++surface) {
-        Scene s = everything(3);
+        Scene s = everything(3, scene::Scheme::LeapFrog);
         s.walls = {{scene::Box{{-6 * dx, -6 * dx, -6 * dx}, {e + 6 * dx, e + 6 * dx, 0}}, scene::Surface(surface), 0.3}};
         const Cloud plane = cloud(Jitter, s);
         EXPECT_LT(off_from(plane, by_the_book(plane, mirrored_at_each_point)).largest(), sharp) << surfaces[surface];

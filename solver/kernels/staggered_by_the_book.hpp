@@ -1,0 +1,360 @@
+#pragma once
+// The staggered scheme by the book: what its two stages make of one particle, over all pairs, in plain loops and doubles. Terms of a pair
+// are those of by_the_book.hpp; what is its own are the moments at which they are taken, and walls as one surface.
+//
+//     strain   x, v, rho, sigma after the move; all distances half a step back, r_ij = x_ij - dt/2 v_ij:
+//              L_i = sum_j V_j (v_j - v_i) (x) grad W - sum_w V_w 2 P_w v_i (x) grad W,  w points of walls,
+//              b_i = -1/rho_i sum_j V_j rho_i rho_j Pi_ij grad W  (of walls: v_iw = 2 P_w v_i, and of the force P_w)
+//              sigma, rho by a whole step: half of the loading before the turn and half after
+//     force    a_i = b_i + g + 1/rho_i sum_j V_j [sigma_i + sigma_j + f^n (tau_i + tau_j)] . grad W
+//                    + 1/rho_i sum_w V_w 2 P_w (sigma_i . grad W) + friction;  v_i += dt/2 a_i
+//
+// A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
+// nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's.
+#include "solver/kernels/by_the_book.hpp"
+#include "solver/physics/drucker_prager.hpp"
+#include <algorithm>
+
+namespace kuzure::book {
+
+// ---- the ground ----------------------------------------------------------------------------------------------------
+/// Walls and their images across the periods.
+struct Ground {
+    struct Part {
+        scene::Shape shape;
+        int wall;
+    };
+    std::vector<Part> parts;
+    int dimensions;
+    double spacing; // m
+    bool holds(Vector x) const
+    {
+        return std::ranges::any_of(parts, [&](const Part& p) { return scene::contains(p.shape, x, dimensions); });
+    }
+};
+inline scene::Shape shifted(scene::Shape shape, Vector by)
+{
+    if (auto* b = std::get_if<scene::Box>(&shape)) b->low = b->low + by, b->high = b->high + by;
+    if (auto* c = std::get_if<scene::Cylinder>(&shape)) c->base = c->base + by;
+    if (auto* s = std::get_if<scene::Sphere>(&shape)) s->center = s->center + by;
+    if (auto* p = std::get_if<scene::Polygon>(&shape)) {
+        for (auto& corner : p->points) corner = {corner[0] + by.x, corner[1] + by.z};
+        p->y = {p->y[0] + by.y, p->y[1] + by.y};
+    }
+    return shape;
+}
+/// `period`: m, 0 along an axis that does not repeat.
+inline Ground ground(std::span<const scene::Wall> walls, Vector period, int dimensions, double spacing)
+{
+    Ground g{{}, dimensions, spacing};
+    const auto turns = [](double length) { return length > 0 ? std::vector{-1.0, 0.0, 1.0} : std::vector{0.0}; };
+    for (int w = 0; w < int(walls.size()); ++w)
+        for (const double a : turns(period.x))
+            for (const double b : turns(period.y))
+                for (const double c : turns(period.z))
+                    g.parts.push_back({shifted(walls[std::size_t(w)].shape, {a * period.x, b * period.y, c * period.z}), w});
+    return g;
+}
+
+/// The point of one face of a shape that is nearest to x, and the face's normal.
+struct OnFace {
+    Vector point, normal;
+};
+inline std::vector<OnFace> nearest_on_each_face(const scene::Shape& shape, Vector x, int dimensions)
+{
+    std::vector<OnFace> all;
+    const auto between = [](double a, double low, double high) { return std::clamp(a, low, high); };
+    if (const auto* b = std::get_if<scene::Box>(&shape)) {
+        const double low[3]{b->low.x, b->low.y, b->low.z}, high[3]{b->high.x, b->high.y, b->high.z}, at[3]{x.x, x.y, x.z};
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double side : {-1.0, 1.0}) {
+                if (dimensions == 2 && axis == 1) continue;
+                double p[3], n[3]{};
+                for (int k = 0; k < 3; ++k) p[k] = between(at[k], low[k], high[k]);
+                p[axis] = side > 0 ? high[axis] : low[axis], n[axis] = side;
+                all.push_back({{p[0], dimensions == 2 ? x.y : p[1], p[2]}, {n[0], n[1], n[2]}});
+            }
+    } else if (const auto* s = std::get_if<scene::Sphere>(&shape)) {
+        Vector d = x - s->center;
+        if (dimensions == 2) d.y = 0;
+        const double r = length(d);
+        const Vector n = r > 0 ? (1 / r) * d : Vector{0, 0, 1};
+        all.push_back({x + (s->radius - r) * n, n});
+    } else if (const auto* c = std::get_if<scene::Cylinder>(&shape)) {
+        const Vector axis{c->base.x, c->base.y, x.z}, d = x - axis;
+        const double r = length(d), top = c->base.z + c->height;
+        const Vector n = r > 0 ? (1 / r) * d : Vector{1, 0, 0};
+        const auto at_height = [](Vector p, double z) { return Vector{p.x, p.y, z}; };
+        all.push_back({at_height(axis + c->radius * n, between(x.z, c->base.z, top)), n});
+        const Vector within = axis + std::min(r, c->radius) * n;
+        all.push_back({at_height(within, top), {0, 0, 1}}), all.push_back({at_height(within, c->base.z), {0, 0, -1}});
+    } else if (const auto* p = std::get_if<scene::Polygon>(&shape)) {
+        const std::size_t corners = p->points.size();
+        for (std::size_t k = 0; k < corners; ++k) {
+            const Vector a{p->points[k][0], 0, p->points[k][1]}, b{p->points[(k + 1) % corners][0], 0, p->points[(k + 1) % corners][1]};
+            const Vector edge = b - a, from_a = Vector{x.x, 0, x.z} - a;
+            Vector on = a + between(dot(from_a, edge) / dot(edge, edge), 0, 1) * edge;
+            on.y = dimensions == 2 ? x.y : between(x.y, p->y[0], p->y[1]);
+            // corners run from x towards z where the area is positive: outside is on the right
+            const double right = scene::area(*p) >= 0 ? 1 : -1;
+            all.push_back({on, (right / length(edge)) * Vector{edge.z, 0, -edge.x}});
+        }
+        if (dimensions == 3 && scene::contains(*p, {x.x, (p->y[0] + p->y[1]) / 2, x.z}))
+            for (const int end : {0, 1}) all.push_back({{x.x, p->y[std::size_t(end)], x.z}, {0, end ? 1.0 : -1.0, 0}});
+    }
+    return all;
+}
+
+/// The tangent plane of an exposed face: the points x with (x - x_w) . normal = depth.
+struct Face {
+    Vector normal;
+    double depth; // m
+    int wall;     // whose contact counts
+};
+/// Where faces of two walls meet in one edge, the one with more grip counts: rough, then Coulomb by its friction, then smooth.
+inline double grip(const scene::Wall& w)
+{
+    return w.surface == scene::Surface::Rough ? std::numbers::pi : w.surface == scene::Surface::Coulomb ? w.friction_angle : -1;
+}
+/// True if all that lies across the way to an edge is ground, a hundredth of a spacing beside it and a little back: along the axes, in
+/// which most pieces end, and around.
+inline bool folds(const Ground& ground, Vector edge, Vector way)
+{
+    const auto cross = [](Vector a, Vector b) { return Vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
+    const Vector c = cross(way, std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0}), a = (1 / length(c)) * c, b = cross(way, a);
+    std::vector<Vector> beside{{1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}};
+    if (ground.dimensions == 3) {
+        beside.insert(beside.end(), {{0, 1, 0}, {0, -1, 0}});
+        for (int k = 0; k < 16; ++k) beside.push_back(std::cos(k * std::numbers::pi / 8) * a + std::sin(k * std::numbers::pi / 8) * b);
+    }
+    return std::ranges::all_of(beside, [&](Vector along) {
+        const Vector across = along - dot(along, way) * way;
+        const double l = length(across);
+        return l <= 1e-3 || ground.holds(edge + ground.spacing * ((1e-2 / l) * across - 5e-6 * way));
+    });
+}
+/// Exposed faces no further than `reach` from x, a point inside the ground, nearest first.
+inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const scene::Wall> walls, Vector x, double reach)
+{
+    const double least = 1e-6 * ground.spacing;
+    std::vector<Face> all;
+    for (const auto& part : ground.parts)
+        for (const OnFace& on : nearest_on_each_face(part.shape, x, ground.dimensions)) {
+            const Vector way = on.point - x;
+            // Beside a face its edge is nearest, and the surface faces the way to it.
+            const double away = length(way), along = std::fabs(dot(way, on.normal));
+            const bool straight = away - along <= least;
+            const double depth = straight ? along : away;
+            if (depth > reach) continue;
+            const Vector normal = straight ? on.normal : (1 / depth) * way;
+            if (depth > least && dot(way, normal) < 0) continue;   // seen from behind
+            if (ground.holds(on.point + least * normal)) continue; // covered
+            // An edge counts where the ground folds about it: the surface does not go on to where it is nearer.
+            if (!straight && !folds(ground, on.point, normal)) continue;
+            const auto same = std::ranges::find_if(
+                all, [&](const Face& f) { return std::fabs(f.depth - depth) <= least && dot(f.normal, normal) > 1 - 1e-9; });
+            if (same == all.end()) all.push_back({normal, depth, part.wall});
+            else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)])) same->wall = part.wall;
+        }
+    // Of equally near ones that which looks up, then along x, then y: the order of walls and faces does not show.
+    std::ranges::sort(all, {}, [&](const Face& f) { return f.depth - least * dot(f.normal, {0.1, 0.01, 1}); });
+    return all;
+}
+/// A point of a wall and the exposed faces that it stands behind.
+struct GroundPoint {
+    Vector x;
+    std::vector<Face> faces;
+};
+/// The face at which a point mirrors particle i, x_ij = x_i - x_w: the nearest that has i in front, else the nearest.
+inline const Face& mirroring(const GroundPoint& w, Vector x_ij)
+{
+    for (const Face& f : w.faces)
+        if (dot(x_ij, f.normal) > f.depth) return f;
+    return w.faces.front();
+}
+/// P a.
+inline Vector crossing(const scene::Wall& wall, const Face& face, Vector a)
+{
+    return wall.surface == scene::Surface::Rough ? a : dot(a, face.normal) * face.normal;
+}
+
+// ---- the state -----------------------------------------------------------------------------------------------------
+/// What the staggered scheme keeps of one particle beside the soil: acceleration m/s^2, stress rate of the diffusion Pa/s, elastic slip at
+/// Coulomb walls m, acceleration with which they hold it m/s^2 (0: no contact).
+struct Kept {
+    Vector acceleration{};
+    Stress stress_rate{};
+    Vector slip{};
+    double pressed = 0;
+    double plastic_strain = 0, opened = 0;
+};
+constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
+
+// ---- stage "strain" --------------------------------------------------------------------------------------------------
+struct Strain {
+    Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
+    Vector viscous{};      // acceleration, m/s^2
+    bool beside_wall = false;
+};
+inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
+{
+    const Kernel kernel = s.kernel();
+    const auto& viscous = s.how.effects.viscosity;
+    const Particle i = particle(soil, k, s);
+    // As it stands at mid-step, seen from where j stands then.
+    const auto at_mid_step = [&](Particle j) {
+        j.x = j.x - (dt / 2) * j.v;
+        return j;
+    };
+    const Particle here = at_mid_step(i);
+    Strain of_i;
+    Matrix M{}, sliding{};
+    Vector pressure{}; // sum V_j rho_i rho_j Pi grad W
+    for (std::size_t l = 0; l < soil.x.size(); ++l) {
+        if (l == k) continue;
+        const Particle j = at_mid_step(particle(soil, l, s));
+        const Vector grad = kernel.gradient(here.x - j.x);
+        of_i.L = of_i.L + j.volume * outer(j.v - i.v, grad);
+        M = M + j.volume * outer(j.x - here.x, grad);
+        if (viscous) pressure = pressure + (j.volume * i.density * j.density * viscosity(*viscous, s.how.h, here, j, i.v - j.v)) * grad;
+    }
+    for (const GroundPoint& w : points) {
+        const Vector r = here.x - w.x, grad = kernel.gradient(r);
+        if (w.faces.empty() || grad == Vector{}) continue;
+        const Face& face = mirroring(w, r);
+        const scene::Wall& wall = s.walls[std::size_t(face.wall)];
+        const Vector mirrored = mirror * crossing(wall, face, i.v); // v_iw
+        (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) =
+            (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) + -i.volume * outer(mirrored, grad);
+        of_i.beside_wall = true;
+        if (!viscous) continue;
+        Particle shown = i; // the wall shows i itself
+        shown.x = w.x;
+        const double Pi = viscosity(*viscous, s.how.h, here, shown, mirrored);
+        pressure = pressure + (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
+    }
+    // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
+    if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
+    // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
+    if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
+    of_i.L = of_i.L + of_i.L_walls;
+    of_i.viscous = (-1 / i.density) * pressure;
+    return of_i;
+}
+
+/// State after a step of length dt, and what of its energy (J) left the mechanical ledger.
+struct Strained {
+    Stress stress;
+    double density, plastic_strain, opened;
+    double plastic, stabilising, wall;
+};
+inline Strained strained(const Particle& i, const Material& soil, const Kept& kept, const Strain& strain, const Setting& s, double dt)
+{
+    const Stress D = symmetric_part(strain.L);
+    auto law = Elastoplastic<double>::from(soil);
+    if (soil.evolves())
+        law =
+            evolved(law, Evolution<double>::from(soil, s.how.h), kept.plastic_strain, std::sqrt(4 * J2(deviator(D))), -trace(i.stress) / 3);
+    const Stress loading = (dt / 2) * (hooke(D, law) + kept.stress_rate);
+    const auto mapped = return_to_cone(rotate(spin_increment(strain.L, dt), i.stress + loading) + loading, law, kept.opened);
+    // d rho/dt = -rho tr L: (rho' - rho)/dt = -tr L (rho' + rho)/2
+    const double change = dt / 2 * trace(strain.L);
+    Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.shear_strain, mapped.opened, 0, 0, 0};
+    // The mean stress works on the strain and on the diffusion's elastic strain; what is not stored is plastic.
+    const double mass = i.density * i.volume, volume = (mass / i.density + mass / next.density) / 2;
+    const Stress mean = 0.5 * (i.stress + next.stress);
+    const double diffused = dt * elastic_power(soil, mean, kept.stress_rate);
+    const double stored = (elastic_power(soil, next.stress, next.stress) - elastic_power(soil, i.stress, i.stress)) / 2;
+    next.plastic = volume * (dt * kuzure::contract(mean, D) + diffused - stored);
+    next.stabilising = -volume * diffused;
+    next.wall = -volume * dt * contract(mean, strain.L_walls);
+    return next;
+}
+
+// ---- stage "force" -----------------------------------------------------------------------------------------------------
+/// Energies taken (J) by viscosity, artificial stress, walls and damping.
+struct Taken {
+    double viscous = 0, stabilising = 0, wall = 0, damping = 0;
+};
+struct Forced {
+    Vector acceleration, velocity;
+    Stress stress_rate{};
+    Vector slip{};
+    double pressed = 0;
+    Taken before, coming; // in the half step before and in the one to come
+    std::int64_t pairs = 0;
+    enum class Contact { None, Sticks, Slides, Approached, LetGo } contact = Contact::None; // with Coulomb faces
+};
+/// `kept.acceleration` is the viscous one of this step; dt is its length, `next` that of the one to come, s.
+inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt,
+                       double next)
+{
+    const Kernel kernel = s.kernel();
+    const scene::Effects& e = s.how.effects;
+    const Material& material = s.soils[std::size_t(soil.soil[k])];
+    const Particle i = particle(soil, k, s);
+    const Vector gravity = e.gravity.value_or(Vector{});
+    Forced of_i;
+    Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
+    double limit = 0, approach = 0, area = 0;
+    for (std::size_t l = 0; l < soil.x.size(); ++l) {
+        const Vector x_ij = i.x - soil.x[l];
+        if (l == k || length(x_ij) >= 2 * s.how.h) continue;
+        ++of_i.pairs;
+        const Particle j = particle(soil, l, s);
+        const Vector grad = kernel.gradient(x_ij);
+        stress = stress + j.volume * ((i.stress + j.stress) * grad);
+        if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
+        if (e.stress_diffusion)
+            of_i.stress_rate = of_i.stress_rate + stress_diffusion(e.stress_diffusion->zeta, s.how.h, gravity, material, i, j, grad);
+    }
+    for (const GroundPoint& w : points) {
+        const Vector r = i.x - w.x, grad = kernel.gradient(r);
+        if (w.faces.empty() || length(r) >= 2 * s.how.h) continue;
+        ++of_i.pairs;
+        const Face& face = mirroring(w, r);
+        const scene::Wall& wall = s.walls[std::size_t(face.wall)];
+        const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
+        if (wall.surface != scene::Surface::Coulomb) {
+            held = held + crossing(wall, face, traction);
+            continue;
+        }
+        push = push + crossing(wall, face, traction);
+        limit += std::tan(wall.friction_angle) * dot(traction, face.normal);
+        const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
+        area -= facing, approach += facing * dot(i.v, face.normal);
+    }
+    Vector by_walls = (1 / i.density) * held;
+    // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
+    // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
+    if (area != 0) {
+        of_i.contact = limit > 0 ? Forced::Contact::Sticks : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
+        if (limit > 0) {
+            const double size = length(push), stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
+            const Vector n = (1 / size) * push;
+            Vector slip = kept.slip + dt * i.v;
+            slip = slip - dot(slip, n) * n;
+            if (const double trial = stiffness * length(slip); trial > limit)
+                slip = (limit / trial) * slip, of_i.contact = Forced::Contact::Slides;
+            of_i.slip = slip, of_i.pressed = size / i.density;
+            push = push - stiffness * slip;
+        }
+        if (of_i.contact != Forced::Contact::LetGo) by_walls = by_walls + (1 / i.density) * push;
+    }
+    const Vector water = (-1 / material.density) * PoreWater::from(e).at(i.x).gradient;
+    const Vector free = (1 / i.density) * (stress + art) + kept.acceleration + by_walls + gravity + water;
+    // Damping over the whole kick, with the mean of the velocities before and after it: a = free - mu (v- + v+)/2, v+ = v- + kick a.
+    const double kick = (dt + next) / 2;
+    of_i.acceleration = (1 / (1 + s.damping * kick / 2)) * (free - s.damping * i.v);
+    of_i.velocity = i.v + (dt / 2) * of_i.acceleration;
+    const Vector then = i.v + kick * of_i.acceleration;
+    const double mass = i.density * i.volume;
+    const auto taken = [&](Vector v, double time) {
+        const auto by = [&](Vector a) { return -mass * time * dot(a, v); };
+        return Taken{by(kept.acceleration), by((1 / i.density) * art), by(by_walls), by((-s.damping / 2) * (i.v + then))};
+    };
+    of_i.before = taken(i.v, dt / 2), of_i.coming = taken(then, next / 2);
+    return of_i;
+}
+
+} // namespace kuzure::book
