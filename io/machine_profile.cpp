@@ -1,4 +1,5 @@
 #include "io/machine_profile.hpp"
+#include "io/batch_template.hpp"
 #include "io/document.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
@@ -8,7 +9,6 @@
 namespace kuzure::io {
 namespace {
 
-const Words<Batch> batch_systems{{"none", Batch::None}, {"pjsub", Batch::Pjsub}, {"slurm", Batch::Slurm}};
 const Words<Resubmit> ways_to_resubmit{{"itself", Resubmit::Itself}, {"chain", Resubmit::Chain}};
 
 std::vector<Key> make_keys()
@@ -18,7 +18,7 @@ std::vector<Key> make_keys()
     const Range any{}, positive{.low = 0, .low_open = true}, count{.low = 1, .high = 1e7};
     return {
         {"title", Text, "", Required, "", any, {}, "\"Oakforest-PACS\"", "what machine this is"},
-        {"batch", Choice, "", Required, "", any, choices_of(batch_systems), "\"slurm\"", "its batch system"},
+        {"batch", Text, "", Required, "", any, {}, "\"slurm\"", "its batch system: NAME of a template NAME.job.sh beside the profiles"},
         {"resubmit", Choice, "", Default, "\"itself\"", any, choices_of(ways_to_resubmit), "\"chain\"",
          "a job at its clock limit submits itself again, or jobs are chained beforehand because compute nodes cannot submit"},
         {"needs_account", Flag, "", Default, "false", any, {}, "true", "jobs are refused without a project (--account)"},
@@ -90,7 +90,8 @@ const KeyTable& machine_keys()
     return keys;
 }
 
-MachineProfile parse_machine_profile(std::string_view text, const std::filesystem::path& file)
+MachineProfile parse_machine_profile(std::string_view text, const std::filesystem::path& file,
+                                     const std::vector<std::filesystem::path>& folders)
 {
     Document d(text, file.string(), machine_keys());
     d.check();
@@ -98,7 +99,12 @@ MachineProfile parse_machine_profile(std::string_view text, const std::filesyste
 
     MachineProfile m;
     m.name = file.stem().string(), m.file = file, m.title = d.text("title");
-    m.batch = d.choice("batch", batch_systems), m.resubmit = d.choice("resubmit", ways_to_resubmit);
+    m.batch = d.text("batch"), m.resubmit = d.choice("resubmit", ways_to_resubmit);
+    m.folders = {file.parent_path()};
+    m.folders.insert(m.folders.end(), folders.begin(), folders.end());
+    if (const auto known = batch_systems(m.folders); std::find(known.begin(), known.end(), m.batch) == known.end())
+        d.complain("batch", fmt::format("expected one of {}, found \"{}\"{} Another system needs a template {}.job.sh beside the profile",
+                                        fmt::join(known, ", "), m.batch, did_you_mean(m.batch, known), m.batch));
     m.needs_account = d.at("needs_account").as_boolean()->get();
     m.node = {d.integer("node.count"), int(number_or_0("node.cores")), d.integer("node.threads_per_core"), d.integer("node.ranks"),
               number_or_0("node.memory")};
@@ -149,12 +155,13 @@ MachineProfile parse_machine_profile(std::string_view text, const std::filesyste
 MachineProfile read_machine_profile(const std::string& name_or_path, const std::vector<std::filesystem::path>& folders)
 {
     if (name_or_path.find('/') != name_or_path.npos || name_or_path.ends_with(".toml"))
-        return parse_machine_profile(read_document_text(name_or_path, machine_keys().file()), name_or_path);
+        return parse_machine_profile(read_document_text(name_or_path, machine_keys().file()), name_or_path, folders);
     std::vector<std::string> known, places;
     std::error_code error;
     for (const auto& folder : folders) {
         const auto file = folder / (name_or_path + ".toml");
-        if (std::filesystem::exists(file, error)) return parse_machine_profile(read_document_text(file, machine_keys().file()), file);
+        if (std::filesystem::exists(file, error))
+            return parse_machine_profile(read_document_text(file, machine_keys().file()), file, folders);
         places.push_back(folder.string());
         for (const auto& entry : std::filesystem::directory_iterator(folder, error))
             if (entry.path().extension() == ".toml") known.push_back(entry.path().stem().string());

@@ -10,7 +10,6 @@
 
 namespace kuzure::io {
 
-enum class Batch { None, Pjsub, Slurm };
 /// How a run goes on after its clock limit: the job submits itself again, or a chain of jobs is submitted at once, for
 /// machines whose compute nodes cannot submit.
 enum class Resubmit { Itself, Chain };
@@ -52,7 +51,8 @@ struct MachineProfile {
     std::string name; // the file's, without .toml
     std::filesystem::path file;
     std::string title;
-    Batch batch;
+    std::string batch;                          // "none", or the system whose template BATCH.job.sh makes its scripts
+    std::vector<std::filesystem::path> folders; // where templates and their parts are: beside the profile, then the known ones
     Resubmit resubmit;
     bool needs_account;
     NodeProfile node;
@@ -69,8 +69,10 @@ struct MachineProfile {
 /// The keys of a machine profile.
 const KeyTable& machine_keys();
 
-/// A profile from text; `file` is what messages call it. Throws BadInput with lines `file:line: key: expected, found, remedy`.
-MachineProfile parse_machine_profile(std::string_view text, const std::filesystem::path& file);
+/// A profile from text; `file` is what messages call it; beside it, and then in the folders, are the templates of batch systems. Throws
+/// BadInput with lines `file:line: key: expected, found, remedy`.
+MachineProfile parse_machine_profile(std::string_view text, const std::filesystem::path& file,
+                                     const std::vector<std::filesystem::path>& folders);
 
 /// A profile by path (with a slash or .toml), or by name from the folders, in their order. Throws BadInput that lists the
 /// names there are.

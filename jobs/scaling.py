@@ -12,7 +12,7 @@ Exit codes as kuzure's: 0, 2 the file is wrong, 3 layouts of the same soil ended
 import argparse, csv, difflib, json, math, os, re, shutil, statistics, subprocess, sys, tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-BATCH = {"slurm": "sbatch", "pjsub": "pjsub", "none": "bash"}
+BATCH = {"slurm": "sbatch", "pjsub": "pjsub", "pbs": "qsub", "none": "bash"}
 
 # What a core's time goes to, by the phases of timers.json. What is not named (other) is kernel's: the step's own small work.
 GROUPS = {

@@ -66,7 +66,7 @@ with tempfile.TemporaryDirectory(prefix="kuzure-install-") as folder:
     prefix = work / "prefix"
     run("cmake", "--install", BUILD, "--prefix", prefix)
     program = prefix / "bin/kuzure"
-    for file in ("share/kuzure/scenes/quickstart.toml", "share/kuzure/machines/slurm.toml", "share/doc/kuzure/README.md",
+    for file in ("share/kuzure/scenes/quickstart.toml", "share/kuzure/machines/slurm.toml", "share/kuzure/machines/slurm.job.sh", "share/doc/kuzure/README.md",
                  "share/doc/kuzure/docs/tutorial.md", "share/bash-completion/completions/kuzure", "share/zsh/site-functions/_kuzure",
                  "share/fish/vendor_completions.d/kuzure.fish", "share/man/man1/kuzure.1"):
         check((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")

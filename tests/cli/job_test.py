@@ -24,6 +24,7 @@ def job(*args, expect=0, says=()):
 
 def write(name, text, executable=False):
     path = os.path.join(work, name)
+    os.makedirs(os.path.dirname(path), exist_ok=True)
     with open(path, "w") as f:
         f.write(text)
     if executable:
@@ -75,6 +76,8 @@ WANTED = {  # what must stand in the script of 2 nodes, by profile and mode
     ("fugaku", ""): ["#PJM -L rscgrp=small", "#PJM -x PJM_LLIO_GFSCACHE=/vol0004", "pjsub --step --sparam \"jid=$id,sd=ec!=5:all\""],
     ("slurm", ""): ["#SBATCH --nodes=2", "#SBATCH --ntasks-per-node=2", "#SBATCH --cpus-per-task=24", "#SBATCH --requeue", "#SBATCH --account=gz00",
                     "scontrol requeue \"$SLURM_JOB_ID\"", "srun --cpus-per-task=24 --cpu-bind=cores --wait=60 \"$program\""],
+    ("pbs", ""): ["#PBS -N hirata_52", "#PBS -l select=2:ncpus=48:mpiprocs=2:ompthreads=24", "#PBS -l walltime=", "#PBS -A gz00", "#PBS -r y", "qsub \"$self\"",
+                  "mpirun -n 4 --map-by ppr:2:node:PE=24 \"$program\""],
     ("here", ""): ["mpirun -n 1 \"$program\""],
 }
 profiles = sorted(os.path.basename(f)[:-5] for f in glob.glob(os.path.join(root, "jobs/machines/*.toml")))
@@ -91,9 +94,11 @@ for (name, mode), wanted in WANTED.items():
         done = subprocess.run(["shellcheck", "-S", "warning", script], capture_output=True, text=True)
         check(done.returncode == 0, f"{name} {mode}: shellcheck {done.stdout}")
     options = re.search(r"\n(?!#)", text)  # batch systems read options up to the first command
-    check(not re.search(r"^#(PJM|SBATCH)", text[options.start():], re.M), f"{name} {mode}: options come before commands")
+    check(not re.search(r"^#(PJM|SBATCH|PBS)", text[options.start():], re.M), f"{name} {mode}: options come before commands")
     if name != "here":
-        check(re.search(r"elapse=\d\d:\d\d:\d\d|--time=\d\d:\d\d:\d\d", text) is not None, f"{name} {mode}: a clock limit")
+        check(re.search(r"elapse=\d\d:\d\d:\d\d|walltime=\d\d:\d\d:\d\d|--time=\d\d:\d\d:\d\d", text) is not None, f"{name} {mode}: a clock limit")
+
+check({f[:-7] for f in os.listdir(os.path.join(root, "jobs/machines")) if f.endswith(".job.sh")} == {"none", "pbs", "pjsub", "slurm"}, "every template is tested by a profile")
 
 # The elapse time follows the prediction, up to the queue's limit; then jobs follow one another.
 def granted(text):
@@ -121,7 +126,7 @@ slurm = open(os.path.join(root, "jobs/machines/slurm.toml")).read()
 for old, new, says in [
     ("cores = 48", "coers = 48", ['node.coers: expected a known key, found "coers"; did you mean "cores"']),
     ("cores = 48", "cores = 0", ["node.cores: expected an integer"]),
-    ('"slurm"', '"slrum"', ['batch: expected one of', 'did you mean "slurm"']),
+    ('"slurm"', '"slrum"', ['batch: expected one of none, pbs, pjsub, slurm', 'did you mean "slurm"', "slrum.job.sh"]),
     ('"srun ', '"srun -n {rank} ', ["launch.command", "found {rank}"]),
     ("[queue.default]", '[queue.default]\nmode = "flat"', ["queue.default.mode", "[mode.flat]"]),
     ("latency = 1.5e-6", "latency = -1", ["cost.latency: expected a number in s, x > 0, found -1"]),
@@ -132,18 +137,57 @@ for old, new, says in [
     line = 1 + next(k for k, (a, b) in enumerate(zip(text.split("\n"), slurm.split("\n"))) if a != b)
     job(large, "--machine", bad, "--nodes", "1", expect=2, says=[f"bad.toml:{line}: " if "mode" not in new else "bad.toml:", *says])
 
+# ---- a site's own batch system: a template beside its profile, and what may be wrong in one
+write("site.toml", slurm.replace('"slurm"', '"bsub"').replace("[launch]", '[launch]\n').replace('["--exclusive"]', '["# ours", "-x"]'))
+BSUB = """#!/bin/bash
+## not for the script
+#BSUB -W {{clock}}
+{{if queue}}
+#BSUB -q {{queue}}
+{{end}}
+#BSUB {{directive}}
+# {{about}}
+{{include start.part.sh}}
+go_on() { bresize "{{ranks}}"; }
+{{include run.part.sh}}
+"""
+write("bsub.job.sh", BSUB)
+write("#BSUB -evil.toml", SCENE)
+text = job("#BSUB -evil.toml", "--machine", "./site.toml", "--nodes", "1", "--account", "gz00", "--set", "title='it''s'", "-o", "$(touch out)`")
+options = text[: re.search(r"\n(?!#)", text).start()].split("\n")
+check([o for o in options if o.startswith("#BSUB")] == [o for o in options if o.startswith("#BSUB -W ") or o == "#BSUB -x"] and "# ours" in options,
+      f"a template beside the profile is filled, and a scene's name gives no option {options}")
+check("not for the script" not in text and "{{" not in text and 'bresize "2"' in text, "its own comments go, placeholders are filled everywhere")
+check(subprocess.run(["bash", "-n", write("site.sh", text)]).returncode == 0 and "'/" in text and "$(touch out)`'" in text, "as sound shell, users' words quoted")
+for old, new, line, says in [
+    ("{{clock}}", "{{clok}}", 3, ['{{clok}}: expected a placeholder, found none of this name; did you mean "clock"', "Known: "]),
+    ("{{clock}}", "{{clock}", 3, ["expected }} after {{"]),
+    ("{{if queue}}", "{{if queues}}", 4, ["{{queues}}", 'did you mean "queue"']),
+    ("{{end}}", "", 4, ["{{if}}: expected {{end}}"]),
+    ("{{if queue}}", "", 6, ["{{end}}: expected {{if NAME}}"]),
+    ("start.part", "strat.part", 9, ["{{include strat.part.sh}}", "found none of this name"]),
+    ("start.part.sh", "../start.part.sh", 9, ["found none of this name"]),
+    ("start.part.sh", "bsub.job.sh", 9, ["includes itself"]),
+    ('"{{ranks}}"', '"{{results}}"', 10, ["{{results}}: expected it outside quotes"]),
+    ("{{clock}}", "{{directive}} {{about}}", 3, ["{{about}}: expected one list on a line"]),
+]:
+    assert old in BSUB
+    write("bsub.job.sh", BSUB.replace(old, new, 1))
+    job(scene, "--machine", "./site.toml", "--nodes", "1", expect=2, says=[f"bsub.job.sh:{line}: ", *says])
+
 # ---- jobs that run
 env = dict(os.environ, PATH=os.path.join(root, "tests/cluster") + ":" + os.environ["PATH"], OMPI_MCA_rmaps_base_oversubscribe="1",
            OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1")
 env.pop("OMP_NUM_THREADS", None)
 # Whatever the machine's speed: the first two jobs stop after a step or a few, the third has the time it was given.
-hasty = write("hasty kuzure", f"""#!/bin/bash
+hasty_text = f"""#!/bin/bash
 args=()
 while [ $# -gt 0 ]; do
     if [ "$1" = --max-minutes ] && [[ $PJM_JOBID == *[12] ]]; then args+=("$1" 0.00001); shift 2; else args+=("$1"); shift; fi
 done
 exec "{program}" "${{args[@]}}"
-""", executable=True)
+"""
+hasty = write("hasty kuzure", hasty_text, executable=True)
 for name in ("oakforest-pacs", "fugaku"):
     text = open(os.path.join(root, f"jobs/machines/{name}.toml")).read()
     write(f"{name}.toml", re.sub(r"^cores = \d+", "cores = 1", text, flags=re.M))
@@ -185,6 +229,46 @@ check(codes == ["5", "5"] and "submit the script again" in said[-1], f"the chain
 done, codes, said = submit("fugaku", "chained", ["bash"], hasty, PJSUB_ALLOW="login")
 check(codes == ["0"], f"submitted again it goes on, and what is left of the chain is taken away: {codes}")
 check(summary("chained").get("state_hash") == want, "and the chain ends with the undisturbed state_hash")
+
+# ---- PBS, by a stand-in of qsub: jobs wait in a folder; the queue is run here, each after the one it depends on
+write("bin/qsub", f"""#!/bin/bash
+spool='{work}/pbs'
+mkdir -p "$spool"
+depend=
+[ "$1" = -W ] && depend=${{2#depend=afternotok:}} && shift 2
+grep -q '^#PBS -l select=2:ncpus=1:mpiprocs=1:ompthreads=1$' "$1" || {{ echo "qsub: no such resources" >&2; exit 1; }}
+id=$(($(ls "$spool" | grep -c 'sh$') + 1))
+cp "$1" "$spool/$id.sh" && echo "$depend" >"$spool/$id.depend" && echo $id
+""", executable=True)
+profile = re.sub(r"^cores = \d+", "cores = 1", open(os.path.join(root, "jobs/machines/pbs.toml")).read(), flags=re.M).replace(" --map-by ppr:{per_node}:node:PE={threads}", "").replace(" OMP_PROC_BIND=close OMP_PLACES=cores", "")
+write("pbs.toml", profile)
+write("pbs-chain.toml", profile.replace('batch = "pbs"', 'batch = "pbs"\nresubmit = "chain"'))
+pbs_env = dict(env, PATH=os.path.join(work, "bin") + ":" + os.environ["PATH"])
+first_stops = write("first stops", hasty_text.replace("$PJM_JOBID == *[12]", "$PBS_JOBID == 1"), executable=True)
+
+
+def run_pbs(machine, out, command, program):
+    shutil.rmtree(os.path.join(work, "pbs"), ignore_errors=True)
+    write(f"{out}.sh", job(scene, "--machine", f"./{machine}.toml", "--nodes", "2", "--ranks-per-node", "1", "--minutes", "5", "-o", out))
+    started = subprocess.run([*command, f"{out}.sh"], capture_output=True, text=True, timeout=60, cwd=work, env=pbs_env)
+    check(started.returncode == 0, f"{out}: submitted {started.stdout} {started.stderr}")
+    codes, said, k = {}, "", 1
+    while os.path.exists(os.path.join(work, f"pbs/{k}.sh")):
+        before = read(f"pbs/{k}.depend").strip()
+        if not before or codes.get(before, "0") != "0":  # afternotok; else PBS takes the job away
+            done = subprocess.run(["bash", os.path.join(work, f"pbs/{k}.sh")], capture_output=True, text=True, timeout=120, cwd=work,
+                                  env=dict(pbs_env, PBS_JOBID=str(k), KUZURE=program))
+            codes[str(k)], said = str(done.returncode), said + done.stdout + done.stderr
+        k += 1
+    return list(codes.values()), said
+
+
+codes, said = run_pbs("pbs", "pbs itself", ["qsub"], first_stops)
+check(codes == ["5", "0"] and summary("pbs itself").get("state_hash") == want, f"PBS: jobs go on by themselves to the undisturbed state_hash: {codes} {said[-300:]}")
+codes, said = run_pbs("pbs-chain", "pbs chain", ["bash"], first_stops)
+check(codes == ["5", "0"] and summary("pbs chain").get("state_hash") == want, f"PBS: a chain goes on to the undisturbed state_hash: {codes} {said[-300:]}")
+codes, said = run_pbs("pbs-chain", "pbs fails", ["bash"], write("ends with three", "#!/bin/bash\nexit 3\n", executable=True))
+check(codes == ["3", "1"] and "ended for good" in said, f"PBS: a chain that failed for good runs nothing more: {codes}")
 
 # ---- endings that must not go on: a program that only ends
 for code, words in [(2, "nothing to go on with"), (3, "numbers failed"), (4, "Make room"), (77, "ended with 77"), (5, "no step was made")]:

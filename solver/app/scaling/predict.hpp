@@ -1,5 +1,6 @@
 #pragma once
-// Seconds that a run will take on a machine of jobs/machines.
+// Seconds that a run will take on a machine of jobs/machines. Here and not in perf/: it needs the cut of
+// solver/run, the scene's estimate and the profiles of io, which perf may not see.
 #include "io/machine_profile.hpp"
 #include "solver/app/scaling/estimate.hpp"
 #include "solver/run/scaling.hpp"
