@@ -12,7 +12,6 @@ Exit codes as kuzure's: 0, 2 the file is wrong, 3 layouts of the same soil ended
 import argparse, csv, difflib, json, math, os, re, shutil, statistics, subprocess, sys, tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-BATCH = {"slurm": "sbatch", "pjsub": "pjsub", "pbs": "qsub", "none": "bash"}
 
 # What a core's time goes to, by the phases of timers.json. What is not named (other) is kernel's: the step's own small work.
 GROUPS = {
@@ -103,6 +102,19 @@ def read_plan(path):
         if plan["kind"] == "weak" and "share" not in case:
             raise Wrong(f"{path}: case: share: expected the number of ranks of this case, found nothing")
     return plan
+
+
+def submit_command(profile_path, batch):
+    """By which a script is handed to a batch system: its template, beside the profile or in jobs/machines, says so."""
+    for folder in (os.path.dirname(profile_path) or ".", os.path.join(ROOT, "jobs/machines")):
+        template = os.path.join(folder, f"{batch}.job.sh")
+        if os.path.exists(template):
+            with open(template) as f:
+                said = re.search(r"^## submit: (\S+)$", f.read(), re.M)
+            if not said:
+                raise Wrong(f'{template}: expected a line "## submit: COMMAND", found none; write by what a script is submitted')
+            return said[1]
+    raise Wrong(f"{profile_path}: batch: expected a batch system with a template {batch}.job.sh beside the profile, found none")
 
 
 def widened(scene, tiles):
@@ -231,11 +243,11 @@ def make_jobs(points, out, kuzure, args, profile):
         with open(script, "w") as f:
             f.write(done.stdout)
         if not args.submit:
-            print(f"{BATCH[profile['batch']]} {script}")
+            print(f"{profile['submit']} {script}")
             continue
-        done = subprocess.run([BATCH[profile["batch"]], script], cwd=os.path.dirname(directory), capture_output=True, text=True)
+        done = subprocess.run([profile["submit"], script], cwd=os.path.dirname(directory), capture_output=True, text=True)
         if done.returncode != 0:
-            raise RuntimeError(f"{p['name']}: {BATCH[profile['batch']]} {script}\nended with {done.returncode}: {done.stderr.strip()[-800:]}")
+            raise RuntimeError(f"{p['name']}: {profile['submit']} {script}\nended with {done.returncode}: {done.stderr.strip()[-800:]}")
         with open(directory + ".submitted", "w") as f:
             f.write(done.stdout)
         print(f"{p['name']}: {done.stdout.strip()}")
@@ -397,6 +409,7 @@ def main():
             try:
                 with open(path, "rb") as f:
                     profile = tomllib.load(f)
+                profile["submit"] = submit_command(path, profile.get("batch"))
             except (OSError, tomllib.TOMLDecodeError) as e:
                 raise Wrong(f"--machine {args.machine}: {e}")
         name = os.path.splitext(os.path.basename(args.plan))[0] + ("-quick" if args.quick else "")
