@@ -88,7 +88,7 @@ bool come_to_rest(Simulation& sim, const RunOptions& options, double most, Settl
 
 } // namespace
 
-double settled_speed(const Scene& s) { return 5e-4 * std::sqrt(gravity(s) * s.space.spacing); }
+double settled_speed(const Scene& s) { return 1e-3 * std::sqrt(gravity(s) * s.space.spacing); }
 double settled_acceleration(const Scene& s) { return 0.02 * gravity(s); }
 
 Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& filling, const RunOptions& options, Settling& s)

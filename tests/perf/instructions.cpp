@@ -1,5 +1,5 @@
-// Passes over a small jittered cloud, for counting instructions: instructions STEPS lanes|plain|staggered (two passes a step). Prints the directed pairs
-// of a pass. Compiled for x86-64-v3 whatever the machine, so that valgrind can run it and the count is the same everywhere.
+// Passes over a small jittered cloud, for counting instructions: instructions STEPS lanes|plain|staggered (two passes a step). Prints the
+// directed pairs of a pass. Compiled for x86-64-v3 whatever the machine, so that valgrind can run it and the count is the same everywhere.
 #include "perf/bench/cloud.hpp"
 #include "solver/kernels/leap_frog.hpp"
 #include "solver/kernels/staggered.hpp"
