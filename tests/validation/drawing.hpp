@@ -279,6 +279,18 @@ struct Generated {
     std::string what;
 };
 
+/// How many wall points there are, and where, rounded to a thousandth of a spacing.
+inline Vector middle(const Generated& g, const Drawing& d)
+{
+    Vector sum{};
+    double points = 0;
+    for (const auto& w : d.walls) {
+        const scene::Lattice lattice(w.shape, spacing, g.dimensions);
+        for (std::int64_t k = 0; k < lattice.size(); ++k) sum = sum + lattice.position(k), points += 1;
+    }
+    const auto rounded = [](double x) { return std::round(1e3 * x / spacing); };
+    return {rounded(sum.x), rounded(points), rounded(sum.z)};
+}
 inline scene::Wall wall_of(int surface, double friction_angle)
 {
     return {scene::Box{}, scene::Surface(surface), surface == 2 ? friction_angle : 0};
@@ -310,6 +322,9 @@ inline Generated generate(unsigned seed)
             const Motion beyond{.shift = {bounds.low.x < again.low - 1e-9 ? g.width : 0, 0, 0}};
             w.shape = again.motion(beyond(w.shape));
         }
+        // A lattice point on a face belongs to the side of greater coordinates: mirrored, such ground is another.
+        if (again.motion.mirrored && middle(g, again) != Motion{.mirrored = true}.turn(middle(g, g.drawings[0])))
+            again = g.drawings[1], again.skin = 0.01;
         g.drawings.push_back(again);
     };
     if (bricks) {
