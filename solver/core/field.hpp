@@ -42,10 +42,10 @@ inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vec
 } acceleration;
 inline constexpr struct StressRate : Field<"stress_rate", "Pa/s", Shape::Symmetric> {
 } stress_rate;
-// Only where there are Coulomb walls: elastic slip, and the force density with which a wall holds the particle (0: no contact).
+// Only where there are Coulomb walls: elastic slip, and the acceleration by which a wall holds the particle (0: no contact).
 inline constexpr struct WallSlip : Field<"wall_slip", "m", Shape::Vector> {
 } wall_slip;
-inline constexpr struct WallPressure : Field<"wall_pressure", "N/m^3", Shape::Scalar> {
+inline constexpr struct WallPressure : Field<"wall_pressure", "m/s^2", Shape::Scalar> {
 } wall_pressure;
 // State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {

@@ -170,6 +170,7 @@ private:
         std::apply([&](const auto&... term) { ((pushed = pushed + per_rho * term.force(sums)), ...); }, model_.more);
         if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
         if (walled) wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho);
+        else forget_contact(p, lanes);
         const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
         Vec3<U> a = ((stress + viscous) + (pushed + wall)) + body;
         // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)
@@ -238,6 +239,14 @@ private:
         Sym3<U> rate = model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));
         if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
         kept.store(lanes.at, rate, lanes.n);
+    }
+    /// Soil with no wall around has none of a contact before.
+    static void forget_contact(Particles& p, const Lanes& lanes)
+    {
+        if (!p.has(field::wall_slip)) return;
+        const auto slip = p[field::wall_slip];
+        const auto pressure = p[field::wall_pressure];
+        for (Index i = lanes.at; i < lanes.at + lanes.n; ++i) slip.set(i, Vector{}), pressure.set(i, 0.0);
     }
     /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
     KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const

@@ -237,6 +237,8 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
     if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
+    // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
+    of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;
     of_i.viscous = (-1 / i.density) * pressure;
     return of_i;

@@ -90,7 +90,7 @@ public:
             for (Index k = 0; k < n; ++k) {
                 for (const Face& f : found[k]) {
                     const scene::Wall& wall = scene.walls[f.wall];
-                    const bool coulomb = wall.surface == scene::Surface::Coulomb;
+                    const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
                     to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
                                         T(wall.surface == scene::Surface::Rough), T(coulomb),
                                         T(coulomb ? std::tan(wall.friction_angle) : 0), T(0)});

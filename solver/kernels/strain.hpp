@@ -184,6 +184,12 @@ private:
                 const Sym3<U> correction = GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - feels_wall);
                 L = {correction * L.x, correction * L.y, correction * L.z};
             }
+        if (walled) {
+            // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy in first order of
+            // dt
+            const U grown = fma(half_dt, trace(L) + trace(at_walls), one);
+            at_walls = {grown * at_walls.x, grown * at_walls.y, grown * at_walls.z};
+        }
         L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
 
         const Sym3<U> D = symmetric_part(L);
