@@ -65,20 +65,25 @@ double displacement(const Comm& comm, const Particles& p)
     return comm.max(d);
 }
 
-/// Runs until the soil rests; false if its time is over before, or it has moved by more than `most` m.
-bool come_to_rest(Simulation& sim, const RunOptions& options, double most, Settling& s)
+/// Runs until the soil rests; false if it moves by more than `most` m, no longer becomes slower, or its time is over. `crossing`:
+/// crossing_time().
+bool come_to_rest(Simulation& sim, const RunOptions& options, double most, double crossing, Settling& s)
 {
     const double slow = settled_speed(sim.scene()), weak = settled_acceleration(sim.scene());
+    constexpr double period = 8; // crossings in which soil that stands becomes slower by a fifth at least
+    double next = 2 * period * crossing, before = std::numeric_limits<double>::infinity();
     int calm = 0;
-    while (!sim.finished()) {
-        const std::int64_t before = s.steps;
+    bool stands = true;
+    while (stands && !sim.finished() && calm < 10) {
         s.speed = sim.max_speed(), s.acceleration = sim.max_acceleration(), s.time = sim.time();
         if (sim.step({.stop = options.settling && options.settling(s)}).stop) throw SettlingStopped();
-        s.steps = before + 1;
+        ++s.steps;
         // at a turning point a wave stands still for a moment
         calm = sim.max_speed() < slow && sim.max_acceleration() < weak ? calm + 1 : 0;
-        if (calm >= 10) break;
-        if (sim.steps() % 32 == 0 && displacement(sim.comm(), sim.particles()) > most) return false;
+        if (sim.steps() % 32 == 0) stands = displacement(sim.comm(), sim.particles()) <= most;
+        if (sim.time() < next) continue;
+        stands = stands && sim.max_speed() < 0.8 * before;
+        before = sim.max_speed(), next += period * crossing;
     }
     s.speed = sim.max_speed(), s.acceleration = sim.max_acceleration(), s.time = sim.time();
     s.displacement = displacement(sim.comm(), sim.particles());
@@ -105,12 +110,12 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
     inner.settles = true;
     std::optional<Simulation> sim;
     try {
-        const double end = 30 * crossing_time(scene, filling);
+        const double crossing = crossing_time(scene, filling), end = 100 * crossing;
         sim.emplace(comm, settling_scene(scene, end, false), inner);
-        s.held = !come_to_rest(*sim, options, most, s);
+        s.held = !come_to_rest(*sim, options, most, crossing, s);
         if (s.held) {
             sim.emplace(comm, settling_scene(scene, end, true), inner);
-            come_to_rest(*sim, options, std::numeric_limits<double>::infinity(), s);
+            come_to_rest(*sim, options, std::numeric_limits<double>::infinity(), crossing, s);
         }
     } catch (const NumbersFailed& e) {
         throw NumbersFailed(fmt::format("while the soil settled, before t = 0: {}", e.what()));
