@@ -24,10 +24,10 @@ std::unique_ptr<Comm>& the_world()
 /// `bytes` bytes as one item, however many.
 mpi::Type long_item(std::size_t bytes, std::size_t piece)
 {
-    const std::size_t whole = bytes / piece, rest = bytes % piece;
+    const std::size_t whole = bytes / piece, remainder = bytes % piece;
     if (whole > std::size_t(INT_MAX)) throw MpiFailed("a message of " + std::to_string(bytes) + " bytes is too long");
     const mpi::Type one = mpi::item_of(piece);
-    const int lengths[2] = {int(whole), int(rest)};
+    const int lengths[2] = {int(whole), int(remainder)};
     const MPI_Aint starts[2] = {0, MPI_Aint(whole * piece)};
     const MPI_Datatype types[2] = {one.type, MPI_BYTE};
     mpi::Type all;
@@ -75,8 +75,7 @@ Launched launched()
     return found;
 }
 
-// ---- start and end
-// -------------------------------------------------------------------------------------------------
+// ---- start and end --------------------------------------------------------------------------------------------------
 Environment::Environment(int& argc, char**& argv)
 {
     ensure(!the_world(), "two MPI environments in one program");
@@ -143,8 +142,7 @@ void Comm::abort(int code) const
     std::abort();
 }
 
-// ---- all ranks at once
-// ---------------------------------------------------------------------------------------------
+// ---- all ranks at once ----------------------------------------------------------------------------------------------
 void Comm::barrier() const
 {
     if (handle_) check(MPI_Barrier(handle_->comm), "MPI_Barrier");
@@ -255,12 +253,11 @@ void Comm::allgather_bytes(const void* mine, void* all, std::size_t item, std::s
     check(MPI_Allgatherv(mine, count[rank_], type.type, all, count.data(), start.data(), type.type, handle_->comm), "MPI_Allgatherv");
 }
 
-// ---- each to whom it likes
-// -----------------------------------------------------------------------------------------
+// ---- sparse exchange ------------------------------------------------------------------------------------------------
 std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece) const
 {
     ensure(piece > 0 && piece <= largest_piece, "exchange: pieces must hold 1 byte to 1 GiB");
-    // A rank that has left this round may already send in the next while others still listen here. Nobody can
+    // A rank that has left this round may already send in the next while others still receive here. No rank can
     // be two rounds ahead, so two tags in turn keep them apart.
     const int tag = round_++ % 2 ? mpi::Odd : mpi::Even;
     std::vector<Message> in;
@@ -277,7 +274,7 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
     }
     if (!handle_) return in;
     // Synchronous sends complete when they are received: once all of mine are, I enter the barrier, and once
-    // everybody is in it, no message is under way.
+    // every rank is in it, no message is under way.
     MPI_Request all_done = MPI_REQUEST_NULL;
     bool in_barrier = false;
     for (int done = 0; !done;) {
@@ -306,38 +303,38 @@ std::vector<Message> Comm::exchange(std::vector<Message> out, std::size_t piece)
     return in;
 }
 
-std::vector<double> Comm::tell(std::span<const int> peers, double mine) const
+std::vector<double> Comm::exchange_scalar(std::span<const int> peers, double mine) const
 {
     std::vector<double> theirs(peers.size());
     if (peers.empty()) return theirs;
     std::vector<MPI_Request> requests(2 * peers.size());
     for (std::size_t k = 0; k < peers.size(); ++k) {
-        ensure(peers[k] >= 0 && peers[k] < size_ && peers[k] != rank_, "tell: a peer that is no other rank");
-        check(MPI_Irecv(&theirs[k], 1, MPI_DOUBLE, peers[k], mpi::Tell, handle_->comm, &requests[k]), "MPI_Irecv");
+        ensure(peers[k] >= 0 && peers[k] < size_ && peers[k] != rank_, "exchange_scalar: a peer that is no other rank");
+        check(MPI_Irecv(&theirs[k], 1, MPI_DOUBLE, peers[k], mpi::Scalar, handle_->comm, &requests[k]), "MPI_Irecv");
     }
     for (std::size_t k = 0; k < peers.size(); ++k)
-        check(MPI_Isend(&mine, 1, MPI_DOUBLE, peers[k], mpi::Tell, handle_->comm, &requests[peers.size() + k]), "MPI_Isend");
+        check(MPI_Isend(&mine, 1, MPI_DOUBLE, peers[k], mpi::Scalar, handle_->comm, &requests[peers.size() + k]), "MPI_Isend");
     check(MPI_Waitall(int(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
     return theirs;
 }
 
-NodePlace Comm::node_place() const
+NodePosition Comm::node_position() const
 {
     if (!handle_) return {.rank = 0, .size = 1, .node = 0, .nodes = 1};
     MPI_Comm shared = MPI_COMM_NULL;
     check(MPI_Comm_split_type(handle_->comm, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &shared), "MPI_Comm_split_type");
-    NodePlace place{};
+    NodePosition here{};
     int lowest = rank_;
-    check(MPI_Comm_rank(shared, &place.rank), "MPI_Comm_rank");
-    check(MPI_Comm_size(shared, &place.size), "MPI_Comm_size");
+    check(MPI_Comm_rank(shared, &here.rank), "MPI_Comm_rank");
+    check(MPI_Comm_size(shared, &here.size), "MPI_Comm_size");
     check(MPI_Bcast(&lowest, 1, MPI_INT, 0, shared), "MPI_Bcast");
     check(MPI_Comm_free(&shared), "MPI_Comm_free");
     auto firsts = allgather(lowest);
     std::ranges::sort(firsts);
     firsts.erase(std::unique(firsts.begin(), firsts.end()), firsts.end());
-    place.nodes = int(firsts.size());
-    place.node = int(std::ranges::lower_bound(firsts, lowest) - firsts.begin());
-    return place;
+    here.nodes = int(firsts.size());
+    here.node = int(std::ranges::lower_bound(firsts, lowest) - firsts.begin());
+    return here;
 }
 
 } // namespace kuzure

@@ -42,25 +42,25 @@ struct Message {
     std::vector<std::byte> bytes;
 };
 /// The same for values of a trivially copyable type.
-template <class T> struct Parcel {
+template <class T> struct MessageOf {
     int rank;
     std::vector<T> items;
 };
 /// Items as bytes.
-template <class T> std::vector<Message> to_messages(std::span<const Parcel<T>> parcels)
+template <class T> std::vector<Message> to_messages(std::span<const MessageOf<T>> typed)
 {
     static_assert(std::is_trivially_copyable_v<T>);
     std::vector<Message> bytes;
-    for (const auto& p : parcels) {
+    for (const auto& p : typed) {
         const auto b = std::as_bytes(std::span(p.items));
         bytes.push_back({p.rank, {b.begin(), b.end()}});
     }
     return bytes;
 }
 /// And back.
-template <class T> std::vector<Parcel<T>> from_messages(const std::vector<Message>& messages)
+template <class T> std::vector<MessageOf<T>> from_messages(const std::vector<Message>& messages)
 {
-    std::vector<Parcel<T>> in;
+    std::vector<MessageOf<T>> in;
     for (const Message& m : messages) {
         ensure(m.bytes.size() % sizeof(T) == 0, "a typed message holds a fraction of an item");
         in.push_back({m.rank, std::vector<T>(m.bytes.size() / sizeof(T))});
@@ -69,7 +69,7 @@ template <class T> std::vector<Parcel<T>> from_messages(const std::vector<Messag
     return in;
 }
 /// Where this rank sits among those that share its memory; nodes are numbered by their lowest rank.
-struct NodePlace {
+struct NodePosition {
     int rank, size;
     int node, nodes;
 };
@@ -104,19 +104,18 @@ public:
     /// nullptr without MPI.
     void* native() const override;
 
-    /// Each rank sends to whom it likes without the receiver knowing: all messages for this rank, by sender,
+    /// Each rank sends to any ranks, which need not know of it before: all messages for this rank, by sender,
     /// those of one sender in the order sent. Collective. Only pairs with data talk (Hoefler, Siebert,
-    /// Lumsdaine 2010: NBX). A message longer than `piece` bytes travels as one derived type, so 2 GiB is no
-    /// limit.
+    /// Lumsdaine 2010: NBX). A message longer than `piece` bytes travels as one derived type, so 2 GiB is no limit.
     std::vector<Message> exchange(std::vector<Message> out, std::size_t piece = largest_piece) const;
     /// The same, typed.
-    template <class T> std::vector<Parcel<T>> exchange(const std::vector<Parcel<T>>& out) const
+    template <class T> std::vector<MessageOf<T>> exchange(const std::vector<MessageOf<T>>& out) const
     {
         return from_messages<T>(exchange(to_messages(std::span(out))));
     }
-    /// The same number to each of some other ranks, which tell theirs in turn; what they tell, in their order. Not collective:
+    /// Exchanges one number with each of some other ranks; theirs, in the order of `peers`. Not collective:
     /// only those that name each other meet.
-    std::vector<double> tell(std::span<const int> peers, double mine) const;
+    std::vector<double> exchange_scalar(std::span<const int> peers, double mine) const;
     /// One value of each rank, by rank, on every rank.
     template <class T> std::vector<T> allgather(const T& mine) const
     {
@@ -137,7 +136,7 @@ public:
         return all;
     }
     /// Collective.
-    NodePlace node_place() const;
+    NodePosition node_position() const;
     /// End every rank of the program with this exit code, without waiting for them.
     [[noreturn]] void abort(int code) const;
 

@@ -14,8 +14,7 @@ constexpr Index parallel = 4096;
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// ---- bytes of several lists in one message
-// -------------------------------------------------------------------------
+// ---- bytes of several lists in one message --------------------------------------------------------------------------
 template <class T> void put(std::vector<std::byte>& to, std::span<const T> items)
 {
     const std::uint64_t n = items.size();
@@ -35,8 +34,7 @@ template <class T> std::vector<T> take(std::span<const std::byte>& from)
 
 } // namespace
 
-// ---- owners
-// --------------------------------------------------------------------------------------------------------
+// ---- owners ---------------------------------------------------------------------------------------------------------
 void Domain::stop_if_lost(bool mine, Vector x) const
 {
     const int rank = int(comm_.max(std::int64_t(mine ? comm_.rank() : -1)));
@@ -49,8 +47,7 @@ int Domain::owner_of(const Block& asked) const
     return known_.owner_of(space_.wrapped(asked), space_.period());
 }
 
-// ---- cutting
-// -------------------------------------------------------------------------------------------------------
+// ---- cutting --------------------------------------------------------------------------------------------------------
 CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo, Labels labels)
 {
     const double start = now();
@@ -116,13 +113,12 @@ EvenReport Domain::even_out(std::span<const BlockWork> mine, HaloCost halo)
 {
     ensure(is_cut_, "a domain is evened out before it is cut");
     std::vector<BlockOwners> known{known_};
-    const auto r = kuzure::even_out(RunCrew(comm_), {{mine.begin(), mine.end()}}, space_.grid(halo.reach, halo.row_bytes), known);
+    const auto r = kuzure::even_out(RunRanks(comm_), {{mine.begin(), mine.end()}}, space_.grid(halo.reach, halo.row_bytes), known);
     known_ = std::move(known[0]);
     return r;
 }
 
-// ---- migration
-// -----------------------------------------------------------------------------------------------------
+// ---- migration ------------------------------------------------------------------------------------------------------
 Domain::Moved Domain::migrate(Particles& p) const
 {
     ensure(is_cut_, "particles migrate before the domain is cut");
@@ -172,8 +168,7 @@ Domain::Moved Domain::migrate(Particles& p) const
     return moved;
 }
 
-// ---- who needs to see whom
-// -----------------------------------------------------------------------------------------
+// ---- which ranks need which particles as ghosts ---------------------------------------------------------------------
 HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
 {
     HaloPlan plan;
@@ -249,10 +244,10 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
 
     // First whole ranks, then their blocks: each rank tells those near it which of its boxes are near them.
     const auto wholes = comm_.allgather(whole);
-    std::vector<Parcel<Bounds>> out;
+    std::vector<MessageOf<Bounds>> out;
     for (int r = 0; r < comm_.size(); ++r) {
         if (whole.empty() || wholes[r].empty()) continue;
-        Parcel<Bounds> p{r, {}};
+        MessageOf<Bounds> p{r, {}};
         if (r == comm_.rank()) {
             if (shifts.size() > 1) p.items = box;
         } else {

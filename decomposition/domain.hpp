@@ -16,7 +16,7 @@ struct HaloCost {
     double row_bytes = 128;
 };
 
-/// Whether a cut leaves a part's work with the rank that holds it, or nobody holds any yet.
+/// Whether a cut leaves a part's work with the rank that holds it, or no rank holds any yet.
 enum class Labels { Kept, Free };
 
 class Domain {
@@ -43,24 +43,22 @@ public:
     EvenReport even_out(std::span<const BlockWork> mine, HaloCost = {});
     /// After cut() and the migration that follows: keeps the owners of blocks up to two around this rank's own. From here
     /// on nothing that a rank holds grows with the whole scene.
-    void forget_far() { known_.forget_far(comm_.rank(), space_.period()); }
+    void keep_neighbourhood() { known_.keep_neighbourhood(comm_.rank(), space_.period()); }
 
     /// Of any block: where no soil was at the last cut, the owner of the nearest block that had some (BlockOwners). The same
-    /// on every rank until forget_far(); from then on for blocks around this rank's own. Throws Broken before cut().
+    /// on every rank until keep_neighbourhood(); from then on for blocks around this rank's own. Throws Broken before cut().
     int owner_of(const Block&) const;
     int owner_of(Vector x) const { return owner_of(block_of(x)); }
 
     struct Moved {
         std::int64_t left = 0, arrived = 0;
     };
-    /// Sends every particle to its owner; collective. Those that stay keep their order, arrivals follow by
-    /// rank.
+    /// Sends every particle to its owner; collective. Those that stay keep their order, arrivals follow by rank.
     Moved migrate(Particles&) const;
 
     /// Who needs to see this rank's particles; collective. Every particle within `reach` (m) of a particle of
     /// another rank, or of any particle across a period, is sent there, whoever owns it and whether or not
-    /// its block held soil at the last cut. On periodic axes positions must lie in [low, low + length] and
-    /// reach <= length.
+    /// its block held soil at the last cut. On periodic axes positions must lie in [low, low + length] and reach <= length.
     HaloPlan plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const;
     HaloPlan plan_halo(const Particles& p, double reach) const { return plan_halo(p[field::position], p.size(), reach); }
 
@@ -70,7 +68,7 @@ public:
     std::span<const int> owners() const { return known_.owners(); }
     /// What this rank knows of owners, to go back to when particles go back to where they were.
     const BlockOwners& known() const { return known_; }
-    void know_again(BlockOwners earlier) { known_ = std::move(earlier); }
+    void restore_owners(BlockOwners earlier) { known_ = std::move(earlier); }
     /// Blocks per period by axis; 0 where open.
     const std::array<std::int32_t, 3>& period() const { return space_.period(); }
     const BlockSpace& space() const { return space_; }

@@ -14,10 +14,10 @@ namespace {
 // What is spent at most; what is left then waits for the next cut, and the report says how much it is.
 constexpr int flow_solves = 3;   // each sees what rounding to whole blocks has left of the one before
 constexpr int offers_a_flow = 3; // each reaches one layer of blocks deeper
-constexpr int polish_rounds = 30;
-constexpr int most_sweeps = 400;    // of one solve: a chain of 200 ranks
-constexpr double flow_error = 0.01; // of the mean work, on the worst rank
-constexpr double anchor = 1e-5;     // of the Laplacian's unit: bodies apart, between which nothing can flow, still have a solution
+constexpr int local_rounds = 30;
+constexpr int most_iterations = 400;    // of one solve: a chain of 200 ranks
+constexpr double flow_error = 0.01;     // of the mean work, on the worst rank
+constexpr double regularisation = 1e-5; // of the Laplacian's unit: bodies apart, between which nothing can flow, still have a solution
 
 double seconds_of(clockid_t clock)
 {
@@ -40,19 +40,19 @@ struct Moved {
 
 /// What one rank knows and does.
 struct Part {
-    Part(int rank, const std::vector<BlockWork>& mine, const std::vector<Parcel<BlockWork>>& told, const BlockGrid& grid);
+    Part(int rank, const std::vector<BlockWork>& mine, const std::vector<MessageOf<BlockWork>>& told, const BlockGrid& grid);
 
-    std::vector<Parcel<Offer>> offers(bool flowing, double mean);
-    std::vector<Parcel<int>> answer(const std::vector<Parcel<Offer>>&);
-    std::vector<Parcel<Moved>> commit(const std::vector<Parcel<int>>& taken);
-    void learn(const std::vector<Parcel<Moved>>&);
+    std::vector<MessageOf<Offer>> offers(bool flowing, double mean);
+    std::vector<MessageOf<int>> answer(const std::vector<MessageOf<Offer>>&);
+    std::vector<MessageOf<Moved>> commit(const std::vector<MessageOf<int>>& taken);
+    void learn(const std::vector<MessageOf<Moved>>&);
     double halo() const;
     BlockOwners table() const;
 
     // Ranks by their place in `ranks`, this one first.
     int rank;
     std::vector<int> ranks;
-    std::map<int, int> place_of_rank;
+    std::map<int, int> index_of_rank;
     std::vector<int> peers; // ranks that touch this one at the start, by number
 
     BlockGraph g; // the blocks that this rank was told of; links of its own and of those around them
@@ -73,9 +73,9 @@ private:
     struct Chosen {
         int block, to;
     };
-    int place(int r);
+    int index_of(int r);
     /// Whether a block touches one that this rank (by place) had at the start and still has.
-    template <class Ready> bool rooted(int b, int q, Ready ready) const;
+    template <class Eligible> bool rooted(int b, int q, Eligible eligible) const;
     /// Whether the rest of the own blocks hangs together as before without this one.
     bool can_spare(int b);
 
@@ -84,16 +84,16 @@ private:
     std::vector<int> queue_;
 };
 
-int Part::place(int r)
+int Part::index_of(int r)
 {
-    const auto [at, fresh] = place_of_rank.try_emplace(r, int(ranks.size()));
+    const auto [at, fresh] = index_of_rank.try_emplace(r, int(ranks.size()));
     if (fresh) ranks.push_back(r), flow.push_back(0), load.push_back(std::numeric_limits<double>::infinity()), ties.push_back(0);
     return at->second;
 }
 
-Part::Part(int me, const std::vector<BlockWork>& mine, const std::vector<Parcel<BlockWork>>& told, const BlockGrid& grid) : rank(me)
+Part::Part(int me, const std::vector<BlockWork>& mine, const std::vector<MessageOf<BlockWork>>& told, const BlockGrid& grid) : rank(me)
 {
-    place(me);
+    index_of(me);
     struct Claim {
         Block block;
         int rank;
@@ -116,7 +116,7 @@ Part::Part(int me, const std::vector<BlockWork>& mine, const std::vector<Parcel<
             if (all[to].work > most) most = all[to].work, winner = all[to].rank;
         }
         g.block.push_back(all[k].block), g.work.push_back(sum), g.particles.push_back(particles);
-        origin.push_back(place(winner)), listed.push_back(own);
+        origin.push_back(index_of(winner)), listed.push_back(own);
     }
     owner = origin;
     const int n = g.size();
@@ -148,9 +148,9 @@ Part::Part(int me, const std::vector<BlockWork>& mine, const std::vector<Parcel<
     offered_.assign(std::size_t(n), 0), barred_ = offered_, seen_ = offered_;
 }
 
-template <class Ready> bool Part::rooted(int b, int q, Ready ready) const
+template <class Eligible> bool Part::rooted(int b, int q, Eligible eligible) const
 {
-    return std::ranges::any_of(g.links(b), [&](const auto& l) { return owner[l.block] == q && origin[l.block] == q && ready(l.block); });
+    return std::ranges::any_of(g.links(b), [&](const auto& l) { return owner[l.block] == q && origin[l.block] == q && eligible(l.block); });
 }
 
 bool Part::can_spare(int b)
@@ -179,11 +179,11 @@ bool Part::can_spare(int b)
     return joined;
 }
 
-std::vector<Parcel<Offer>> Part::offers(bool flowing, double mean)
+std::vector<MessageOf<Offer>> Part::offers(bool flowing, double mean)
 {
     chosen_.clear();
     std::ranges::fill(barred_, 0);
-    std::vector<Parcel<Offer>> out;
+    std::vector<MessageOf<Offer>> out;
     if (!flowing && work <= mean) return out;
     const auto always = [](int) { return true; };
     while (blocks - int(chosen_.size()) > 1) {
@@ -200,7 +200,7 @@ std::vector<Parcel<Offer>> Part::offers(bool flowing, double mean)
         flow[best.to] -= g.work[best.block];
         owner[best.block] = best.to;
         const int r = ranks[best.to];
-        auto at = std::ranges::find(out, r, &Parcel<Offer>::rank);
+        auto at = std::ranges::find(out, r, &MessageOf<Offer>::rank);
         if (at == out.end()) at = out.insert(out.end(), {r, {}});
         at->items.push_back({g.block[best.block], flowing ? std::max(work, good_balance * mean) : work});
         if (!flowing) break;
@@ -209,11 +209,11 @@ std::vector<Parcel<Offer>> Part::offers(bool flowing, double mean)
     return out;
 }
 
-std::vector<Parcel<int>> Part::answer(const std::vector<Parcel<Offer>>& in)
+std::vector<MessageOf<int>> Part::answer(const std::vector<MessageOf<Offer>>& in)
 {
     auto order = in;
-    std::ranges::stable_sort(order, std::greater{}, [](const Parcel<Offer>& p) { return p.items.front().load; });
-    std::vector<Parcel<int>> out;
+    std::ranges::stable_sort(order, std::greater{}, [](const MessageOf<Offer>& p) { return p.items.front().load; });
+    std::vector<MessageOf<int>> out;
     double taken = 0;
     for (const auto& p : order) {
         int n = 0;
@@ -230,10 +230,10 @@ std::vector<Parcel<int>> Part::answer(const std::vector<Parcel<Offer>>& in)
     return out;
 }
 
-std::vector<Parcel<Moved>> Part::commit(const std::vector<Parcel<int>>& taken)
+std::vector<MessageOf<Moved>> Part::commit(const std::vector<MessageOf<int>>& taken)
 {
     std::map<int, int> left; // that may still go, by receiver
-    for (const auto& p : taken) left[place_of_rank.at(p.rank)] = p.items.front();
+    for (const auto& p : taken) left[index_of_rank.at(p.rank)] = p.items.front();
     std::map<int, std::vector<Moved>> news;
     for (const Chosen& c : chosen_) {
         offered_[c.block] = 0;
@@ -246,7 +246,7 @@ std::vector<Parcel<Moved>> Part::commit(const std::vector<Parcel<int>>& taken)
         }
         --n;
         owner[c.block] = c.to, work -= g.work[c.block], --blocks, ++given;
-        // Whoever has something within two blocks of it knows it.
+        // Every rank that has a block within two of it knows it.
         const Moved moved{g.block[c.block], ranks[c.to]};
         std::vector<int> who;
         for (const auto& l : g.links(c.block)) {
@@ -258,18 +258,18 @@ std::vector<Parcel<Moved>> Part::commit(const std::vector<Parcel<int>>& taken)
         for (const int q : who)
             if (q != 0) news[ranks[q]].push_back(moved);
     }
-    std::vector<Parcel<Moved>> out;
+    std::vector<MessageOf<Moved>> out;
     for (auto& [r, items] : news) out.push_back({r, std::move(items)});
     return out;
 }
 
-void Part::learn(const std::vector<Parcel<Moved>>& news)
+void Part::learn(const std::vector<MessageOf<Moved>>& news)
 {
     for (const auto& p : news)
         for (const Moved& m : p.items) {
             const int b = index[m.block];
             if (b < 0) continue;
-            owner[b] = place(m.to);
+            owner[b] = index_of(m.to);
             if (owner[b] == 0) work += g.work[b], ++blocks;
         }
 }
@@ -293,11 +293,10 @@ BlockOwners Part::table() const
     return {std::move(block), std::move(by), false};
 }
 
-// ---- all parts that are here, round by round
-// -------------------------------------------------------------------------
-class Evening {
+// ---- all parts that are here, round by round ------------------------------------------------------------------------
+class DiffusiveBalancer {
 public:
-    Evening(const Crew& crew, const std::vector<std::vector<BlockWork>>& own, const BlockGrid& grid);
+    DiffusiveBalancer(const RankGroup& group, const std::vector<std::vector<BlockWork>>& own, const BlockGrid& grid);
     EvenReport run();
     std::vector<BlockOwners> tables() const
     {
@@ -321,13 +320,14 @@ private:
     bool round(bool flowing);
     double heaviest() const;
 
-    const Crew& crew_;
+    const RankGroup& group_;
     std::vector<Part> parts_;
     double mean_ = 0;
     EvenReport report_;
 };
 
-Evening::Evening(const Crew& crew, const std::vector<std::vector<BlockWork>>& own, const BlockGrid& grid) : crew_(crew)
+DiffusiveBalancer::DiffusiveBalancer(const RankGroup& group, const std::vector<std::vector<BlockWork>>& own, const BlockGrid& grid)
+    : group_(group)
 {
     std::vector<std::array<std::int32_t, 6>> mine;
     double bad = 0;
@@ -345,29 +345,29 @@ Evening::Evening(const Crew& crew, const std::vector<std::vector<BlockWork>>& ow
         }
         mine.push_back(box);
     }
-    crew.max(std::span(&bad, 1));
+    group.max(std::span(&bad, 1));
     if (bad > 0) throw Broken("the domain cannot be cut: " + failure);
 
-    // Everybody hears of the blocks near its own: those within two of the box around them.
-    const auto boxes = crew.allgather(mine);
+    // Every rank receives the blocks near its own: those within two of the box around them.
+    const auto boxes = group.allgather(mine);
     const auto near = [&](int axis, std::int32_t low, std::int32_t high, const std::array<std::int32_t, 6>& box) {
         const std::int32_t n = grid.period[axis];
         for (int turn = n ? -1 : 0; turn <= (n ? 1 : 0); ++turn)
             if (low + turn * n <= box[axis + 3] + 2 && high + turn * n >= box[axis] - 2) return true;
         return false;
     };
-    std::vector<std::vector<Parcel<BlockWork>>> out(own.size());
+    std::vector<std::vector<MessageOf<BlockWork>>> out(own.size());
     std::vector<double> busy(own.size());
     for (std::size_t k = 0; k < own.size(); ++k) {
         const double begin = busy_now();
         const auto& box = mine[k];
         if (own[k].empty()) continue;
-        for (int r = 0; r < crew.size(); ++r) {
-            if (r == crew.first() + int(k) || boxes[r][0] > boxes[r][3]) continue;
+        for (int r = 0; r < group.size(); ++r) {
+            if (r == group.first() + int(k) || boxes[r][0] > boxes[r][3]) continue;
             bool close = true;
             for (int a = 0; a < 3 && close; ++a) close = near(a, box[a], box[a + 3], boxes[r]);
             if (!close) continue;
-            Parcel<BlockWork> p{r, {}};
+            MessageOf<BlockWork> p{r, {}};
             for (const auto& b : own[k])
                 if (near(0, b.block[0], b.block[0], boxes[r]) && near(1, b.block[1], b.block[1], boxes[r]) &&
                     near(2, b.block[2], b.block[2], boxes[r]))
@@ -376,41 +376,41 @@ Evening::Evening(const Crew& crew, const std::vector<std::vector<BlockWork>>& ow
         }
         busy[k] = busy_now() - begin;
     }
-    const auto in = crew.exchange(out);
+    const auto in = group.exchange(out);
     for (std::size_t k = 0; k < own.size(); ++k) {
         const double begin = busy_now();
-        parts_.emplace_back(crew.first() + int(k), own[k], in[k], grid);
+        parts_.emplace_back(group.first() + int(k), own[k], in[k], grid);
         parts_.back().busy = busy[k] + busy_now() - begin;
     }
 }
 
-double Evening::heaviest() const
+double DiffusiveBalancer::heaviest() const
 {
     double most = 0;
     for (const Part& p : parts_) most = std::max(most, p.work);
-    crew_.max(std::span(&most, 1));
+    group_.max(std::span(&most, 1));
     return most;
 }
 
-/// Conjugate gradients with one sum a sweep (Chronopoulos and Gear, J. Comput. Appl. Math. 25 (1989) 153).
-void Evening::solve()
+/// Conjugate gradients with one sum an iteration (Chronopoulos and Gear, J. Comput. Appl. Math. 25 (1989) 153).
+void DiffusiveBalancer::solve()
 {
     const std::size_t n = parts_.size();
     std::vector<std::vector<int>> peers;
     std::vector<double> x(n, 0.0), r(n), p(n, 0.0), s(n, 0.0), w(n);
     for (std::size_t k = 0; k < n; ++k) peers.push_back(parts_[k].peers), r[k] = parts_[k].work - mean_;
     double before = 0, step = 0;
-    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-        const auto theirs = crew_.tell(peers, r);
+    for (int iteration = 0; iteration < most_iterations; ++iteration) {
+        const auto theirs = group_.exchange_scalar(peers, r);
         // A sum of eighth powers is as good as a maximum, and is one with the others.
         double sums[3] = {0, 0, 0};
         for (std::size_t k = 0; k < n; ++k) {
-            w[k] = (double(peers[k].size()) + anchor) * r[k];
+            w[k] = (double(peers[k].size()) + regularisation) * r[k];
             for (const double t : theirs[k]) w[k] -= t;
             sums[0] += r[k] * r[k], sums[1] += w[k] * r[k], sums[2] += std::pow(r[k] / (flow_error * mean_), 8);
         }
-        crew_.sum(sums);
-        ++report_.sweeps;
+        group_.sum(sums);
+        ++report_.iterations;
         if (sums[2] <= 1) break;
         const double beta = before > 0 ? sums[0] / before : 0, curvature = sums[1] - (step > 0 ? beta * sums[0] / step : 0);
         if (!(curvature > 0)) break;
@@ -420,22 +420,22 @@ void Evening::solve()
             x[k] += step * p[k], r[k] -= step * s[k];
         }
     }
-    const auto theirs = crew_.tell(peers, x);
-    ++report_.sweeps;
+    const auto theirs = group_.exchange_scalar(peers, x);
+    ++report_.iterations;
     for (std::size_t k = 0; k < n; ++k) {
         Part& part = parts_[k];
-        for (std::size_t q = 0; q < part.peers.size(); ++q) part.flow[part.place_of_rank.at(part.peers[q])] = x[k] - theirs[k][q];
+        for (std::size_t q = 0; q < part.peers.size(); ++q) part.flow[part.index_of_rank.at(part.peers[q])] = x[k] - theirs[k][q];
     }
 }
 
-bool Evening::round(bool flowing)
+bool DiffusiveBalancer::round(bool flowing)
 {
-    const auto offers = crew_.exchange(each([&](Part& p) { return p.offers(flowing, mean_); }));
+    const auto offers = group_.exchange(each([&](Part& p) { return p.offers(flowing, mean_); }));
     std::size_t k = 0;
-    const auto answers = crew_.exchange(each([&](Part& p) { return p.answer(offers[k++]); }));
+    const auto answers = group_.exchange(each([&](Part& p) { return p.answer(offers[k++]); }));
     k = 0;
     std::int64_t given = 0;
-    const auto news = crew_.exchange(each([&](Part& p) {
+    const auto news = group_.exchange(each([&](Part& p) {
         const auto before = p.given;
         auto out = p.commit(answers[k++]);
         given += p.given - before;
@@ -444,21 +444,21 @@ bool Evening::round(bool flowing)
     k = 0;
     each([&](Part& p) { return p.learn(news[k++]), 0; });
     double moved = double(given);
-    crew_.sum(std::span(&moved, 1));
+    group_.sum(std::span(&moved, 1));
     report_.moved += std::int64_t(moved);
     ++report_.rounds;
     return moved > 0;
 }
 
-EvenReport Evening::run()
+EvenReport DiffusiveBalancer::run()
 {
     double sums[3] = {0, 0, 0};
     for (const Part& p : parts_) {
         sums[0] += p.work, sums[1] += p.blocks;
         for (const int b : p.home) sums[2] += p.g.particles[b] * p.g.grid.row_bytes;
     }
-    crew_.sum(sums);
-    mean_ = report_.mean = sums[0] / crew_.size();
+    group_.sum(sums);
+    mean_ = report_.mean = sums[0] / group_.size();
     report_.blocks = std::int64_t(sums[1]);
     if (mean_ > 0) {
         double most = heaviest();
@@ -471,14 +471,14 @@ EvenReport Evening::run()
             most = heaviest();
             if (rounds == 0) break;
         }
-        for (int k = 0; k < polish_rounds && most > enough; ++k) {
+        for (int k = 0; k < local_rounds && most > enough; ++k) {
             std::vector<std::vector<int>> peers;
             std::vector<double> load;
             for (const Part& p : parts_) peers.push_back(p.peers), load.push_back(p.work);
-            const auto theirs = crew_.tell(peers, load);
-            ++report_.sweeps;
+            const auto theirs = group_.exchange_scalar(peers, load);
+            ++report_.iterations;
             for (std::size_t p = 0; p < parts_.size(); ++p)
-                for (std::size_t q = 0; q < peers[p].size(); ++q) parts_[p].load[parts_[p].place_of_rank.at(peers[p][q])] = theirs[p][q];
+                for (std::size_t q = 0; q < peers[p].size(); ++q) parts_[p].load[parts_[p].index_of_rank.at(peers[p][q])] = theirs[p][q];
             if (!round(false)) break;
             most = heaviest();
         }
@@ -486,18 +486,18 @@ EvenReport Evening::run()
     }
     double halo = 0, busy = 0;
     for (const Part& p : parts_) halo += p.halo(), busy = std::max(busy, p.busy);
-    crew_.sum(std::span(&halo, 1)), crew_.max(std::span(&busy, 1));
+    group_.sum(std::span(&halo, 1)), group_.max(std::span(&busy, 1));
     report_.halo = sums[2] > 0 ? halo / sums[2] : 0;
     report_.busy = busy;
     return report_;
 }
 
 /// Lists of ranks' own blocks: a particle that has left its owner's blocks since the last migration counts where it will be.
-std::vector<std::vector<BlockWork>> own_blocks(const Crew& crew, const std::vector<std::vector<BlockWork>>& listed, const BlockGrid& grid,
-                                               const std::vector<BlockOwners>& known)
+std::vector<std::vector<BlockWork>> own_blocks(const RankGroup& group, const std::vector<std::vector<BlockWork>>& listed,
+                                               const BlockGrid& grid, const std::vector<BlockOwners>& known)
 {
     const std::size_t n = listed.size();
-    std::vector<std::vector<Parcel<BlockWork>>> out(n);
+    std::vector<std::vector<MessageOf<BlockWork>>> out(n);
     std::vector<std::map<Block, BlockWork>> own(n);
     const auto add = [&](std::size_t k, const BlockWork& b) {
         const auto [at, fresh] = own[k].try_emplace(b.block, b);
@@ -507,12 +507,12 @@ std::vector<std::vector<BlockWork>> own_blocks(const Crew& crew, const std::vect
         std::map<int, std::vector<BlockWork>> elsewhere;
         for (const auto& b : listed[k]) {
             const int r = known[k].owner_of(b.block, grid.period);
-            if (r == crew.first() + int(k)) add(k, b);
+            if (r == group.first() + int(k)) add(k, b);
             else elsewhere[r].push_back(b);
         }
         for (auto& [r, blocks] : elsewhere) out[k].push_back({r, std::move(blocks)});
     }
-    const auto in = crew.exchange(out);
+    const auto in = group.exchange(out);
     std::vector<std::vector<BlockWork>> lists(n);
     for (std::size_t k = 0; k < n; ++k) {
         for (const auto& p : in[k])
@@ -524,16 +524,16 @@ std::vector<std::vector<BlockWork>> own_blocks(const Crew& crew, const std::vect
 
 } // namespace
 
-EvenReport even_out(const Crew& crew, const std::vector<std::vector<BlockWork>>& listed, const BlockGrid& grid,
+EvenReport even_out(const RankGroup& group, const std::vector<std::vector<BlockWork>>& listed, const BlockGrid& grid,
                     std::vector<BlockOwners>& known)
 {
-    ensure(int(listed.size()) == crew.here() && known.size() == listed.size(), "every rank here lists its blocks");
+    ensure(int(listed.size()) == group.here() && known.size() == listed.size(), "every rank here lists its blocks");
     double seconds = -now();
-    Evening evening(crew, own_blocks(crew, listed, grid, known), grid);
-    EvenReport r = evening.run();
-    known = evening.tables();
+    DiffusiveBalancer balancer(group, own_blocks(group, listed, grid, known), grid);
+    EvenReport r = balancer.run();
+    known = balancer.tables();
     seconds += now();
-    crew.max(std::span(&seconds, 1));
+    group.max(std::span(&seconds, 1));
     r.seconds = seconds;
     return r;
 }

@@ -1,8 +1,8 @@
 #pragma once
-// Later cuts: ranks that touch hand each other blocks until all have the same work. Nobody gathers anything: a rank looks at
-// its own blocks and those up to two further, and hears of the others only sums, maxima and bounding boxes.
-#include "decomposition/crew.hpp"
+// Later cuts: ranks that touch hand each other blocks until all have the same work. Nothing is gathered: a rank knows
+// its own blocks and those up to two further, and of the others only sums, maxima and bounding boxes.
 #include "decomposition/owners.hpp"
+#include "decomposition/rank_group.hpp"
 
 namespace kuzure {
 
@@ -13,7 +13,7 @@ struct EvenReport {
     double halo = 0;              // bytes of halo between blocks of different ranks, per byte of owned particles' records
     std::int64_t blocks = 0;      // in all
     std::int64_t moved = 0;       // of them
-    int sweeps = 0;               // numbers told to peers
+    int iterations = 0;           // exchanges of one number between peers
     int rounds = 0;               // of offers
     double busy = 0;              // s, of the rank that computed longest
     double seconds = 0;           // s, waiting included
@@ -27,6 +27,6 @@ struct EvenReport {
 /// `listed`: of each rank here the blocks of its particles, wrapped, whoever owns them; of two ranks that take a block for
 /// their own, who has more of its work keeps it. `known`: what each rank here knows, and then must know. Throws Broken on
 /// every rank as block_graph() does.
-EvenReport even_out(const Crew&, const std::vector<std::vector<BlockWork>>& listed, const BlockGrid&, std::vector<BlockOwners>& known);
+EvenReport even_out(const RankGroup&, const std::vector<std::vector<BlockWork>>& listed, const BlockGrid&, std::vector<BlockOwners>& known);
 
 } // namespace kuzure

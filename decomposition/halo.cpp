@@ -46,8 +46,7 @@ Halo::Halo(Halo&&) noexcept = default;
 
 Halo& Halo::operator=(Halo&& other) noexcept
 {
-    // A refresh that is still under way (an exception passes by) owns its buffers until MPI ends: leave them
-    // to it.
+    // A refresh that is still under way (an exception passes by) owns its buffers until MPI ends: leave them to it.
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
     impl_ = std::move(other.impl_);
     channels_ = std::move(other.channels_);
@@ -71,7 +70,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
     const std::size_t longest = std::ranges::max(row_bytes);
     const MPI_Comm mpi_comm = comm.native() ? *static_cast<const MPI_Comm*>(comm.native()) : MPI_COMM_NULL; // none without MPI
 
-    std::vector<Parcel<std::int64_t>> counts;
+    std::vector<MessageOf<std::int64_t>> counts;
     std::int64_t n_in = 0;
     for (const auto& p : m.plan.peers) {
         const auto n = std::int64_t(p.sends.size());

@@ -1,6 +1,6 @@
 #pragma once
-// Ghosts: which owned particles which rank needs to see, and their records' way there, once per step.
-// Periodic images of a rank's own particles take the same road without MPI.
+// Ghosts: which particles each rank needs of others, and the exchange of their records, once per step.
+// Periodic images of a rank's own particles are handled alike, without MPI.
 #include "decomposition/comm.hpp"
 #include "solver/core/particles.hpp"
 #include "solver/core/tensor.hpp"
@@ -30,8 +30,7 @@ struct Ghost {
     std::int32_t soil;
 };
 
-/// The exchange of one plan. Rows arrive by sending rank, those of one rank in its plan's order. Main thread
-/// only.
+/// The exchange of one plan. Rows arrive by sending rank, those of one rank in its plan's order. Main thread only.
 class Halo {
 public:
     /// Collective. The plan's counts are exchanged; rows of a refresh have one of these sizes, packed without gaps.
@@ -50,9 +49,9 @@ public:
     template <class Row, class Make> std::vector<Row> collect(Make make) const
     {
         static_assert(std::is_trivially_copyable_v<Row>);
-        std::vector<Parcel<Row>> out;
+        std::vector<MessageOf<Row>> out;
         for (const auto& peer : plan().peers) {
-            Parcel<Row> p{peer.rank, {}};
+            MessageOf<Row> p{peer.rank, {}};
             p.items.reserve(peer.sends.size());
             for (const auto& s : peer.sends) p.items.push_back(make(s.owned, plan().shift[s.shift]));
             if (!p.items.empty()) out.push_back(std::move(p));

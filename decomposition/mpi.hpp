@@ -7,7 +7,7 @@
 namespace kuzure::mpi {
 
 /// exchange() alternates between the first two; the others are point to point.
-enum Tag { Even = 0, Odd = 1, Gather = 2, Refresh = 3, Tell = 4 };
+enum Tag { Even = 0, Odd = 1, Gather = 2, Refresh = 3, Scalar = 4 };
 
 inline void check(int code, const char* call)
 {

@@ -8,7 +8,7 @@ namespace kuzure {
 int BlockOwners::owner_of(const Block& b, const std::array<std::int32_t, 3>& period) const
 {
     if (block_.empty()) return 0;
-    if (const int k = place_of(b); k >= 0) return owner_[k];
+    if (const int k = index_of(b); k >= 0) return owner_[k];
 
     // (largest difference, squared distance, lexicographic place): the least wins.
     using Rank = std::tuple<std::int64_t, std::int64_t, int>;
@@ -30,7 +30,7 @@ int BlockOwners::owner_of(const Block& b, const std::array<std::int32_t, 3>& per
             for (int j = -s; j <= s; ++j)
                 for (int l = -s; l <= s; l += std::abs(i) == s || std::abs(j) == s ? 1 : 2 * s) {
                     const Block near = wrapped({b[0] + i, b[1] + j, b[2] + l}, period);
-                    const int k = place_of(near);
+                    const int k = index_of(near);
                     if (k >= 0) best = std::min(best, rank_of(k));
                 }
     if (best == none)
@@ -38,7 +38,7 @@ int BlockOwners::owner_of(const Block& b, const std::array<std::int32_t, 3>& per
     return owner_[std::get<2>(best)];
 }
 
-void BlockOwners::forget_far(int rank, const std::array<std::int32_t, 3>& period)
+void BlockOwners::keep_neighbourhood(int rank, const std::array<std::int32_t, 3>& period)
 {
     if (!all_) return;
     std::unordered_set<std::uint64_t> near;

@@ -1,6 +1,5 @@
 #pragma once
-// Blocks and who owns them, as one rank knows them: all of them while a cut of the whole domain arrives, else those around
-// its own.
+// Blocks and who owns them, as one rank knows them: all of them while a cut of the whole domain arrives, else those around its own.
 #include "decomposition/partition.hpp"
 #include <algorithm>
 
@@ -20,14 +19,14 @@ public:
     /// who is asked next knows nearer ones, so what is sent on arrives.
     int owner_of(const Block&, const std::array<std::int32_t, 3>& period) const;
     /// Forgets what is more than two blocks away from all of a rank's own.
-    void forget_far(int rank, const std::array<std::int32_t, 3>& period);
+    void keep_neighbourhood(int rank, const std::array<std::int32_t, 3>& period);
 
     std::span<const Block> blocks() const { return block_; }
     std::span<const int> owners() const { return owner_; }
 
 private:
     /// Place of a wrapped block in block_, or -1.
-    int place_of(const Block& b) const
+    int index_of(const Block& b) const
     {
         const auto at = std::ranges::lower_bound(block_, b);
         return at != block_.end() && *at == b ? int(at - block_.begin()) : -1;

@@ -17,8 +17,7 @@ std::string partitioner_library()
 
 const char* name(Method m) { return m == Method::Metis ? "METIS" : "Hilbert curve"; }
 
-// ---- the graph
-// -----------------------------------------------------------------------------------------------------
+// ---- the graph ------------------------------------------------------------------------------------------------------
 void check_block(const BlockWork& b, const BlockGrid& grid)
 {
     ensure(within_limit(b.block), "a block lies beyond the block limit");
@@ -74,12 +73,10 @@ BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
     return g;
 }
 
-// ---- what a cut is worth
-// -------------------------------------------------------------------------------------------
+// ---- what a cut is worth --------------------------------------------------------------------------------------------
 namespace {
 
-/// A block seen along one axis: the shares of it within reach of its low face, of its high face, of both, of
-/// none.
+/// A block seen along one axis: the shares of it within reach of its low face, of its high face, of both, of none.
 struct Layer {
     double share;
     bool low, high;
@@ -132,39 +129,39 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
     const auto x = layers(g.grid.reach[0]), y = layers(g.grid.reach[1]), z = layers(g.grid.reach[2]);
     const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
     std::vector<std::vector<int>> sends(parts);
-    struct Wish {
+    struct Request {
         int part;
         bool image; // reaches itself or its own part through a period: each such direction is a ghost of its
                     // own
         std::array<std::int8_t, 3> d;
     };
-    std::vector<Wish> wishes;
+    std::vector<Request> requests;
     for (int b = 0; b < g.size(); ++b) {
-        wishes.clear();
+        requests.clear();
         for (const auto& l : g.links(b)) {
             bool image = false;
             for (int a = 0; a < 3; ++a) image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
-            if (part[l.block] != part[b] || image) wishes.push_back({part[l.block], image, l.d});
+            if (part[l.block] != part[b] || image) requests.push_back({part[l.block], image, l.d});
         }
-        std::ranges::stable_sort(wishes, {}, [](const Wish& w) { return std::pair(w.part, w.image); });
-        for (std::size_t from = 0, to; from < wishes.size(); from = to) {
+        std::ranges::stable_sort(requests, {}, [](const Request& w) { return std::pair(w.part, w.image); });
+        for (std::size_t from = 0, to; from < requests.size(); from = to) {
             to = from;
-            while (to < wishes.size() && wishes[to].part == wishes[from].part && wishes[to].image == wishes[from].image) ++to;
+            while (to < requests.size() && requests[to].part == requests[from].part && requests[to].image == requests[from].image) ++to;
             double share = 0;
             for (const auto& lx : x)
                 for (const auto& ly : y)
                     for (const auto& lz : z)
                         for (std::size_t w = from; w < to; ++w) {
-                            const auto& d = wishes[w].d;
+                            const auto& d = requests[w].d;
                             if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2])) continue;
                             share += lx.share * ly.share * lz.share;
                             break;
                         }
             const double rows = share * g.particles[b];
-            r.ghosts[wishes[from].part] += rows;
-            if (wishes[from].part == part[b]) continue;
+            r.ghosts[requests[from].part] += rows;
+            if (requests[from].part == part[b]) continue;
             r.cut_bytes += rows * g.grid.row_bytes;
-            sends[part[b]].push_back(wishes[from].part);
+            sends[part[b]].push_back(requests[from].part);
         }
     }
     for (int p = 0; p < parts; ++p) {
@@ -174,8 +171,7 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
     return r;
 }
 
-// ---- cutting
-// -------------------------------------------------------------------------------------------------------
+// ---- cutting --------------------------------------------------------------------------------------------------------
 std::uint64_t hilbert_index(std::array<std::uint32_t, 3> x, int bits)
 {
     const std::uint32_t top = std::uint32_t(1) << (bits - 1);
@@ -242,8 +238,7 @@ struct MetisGraph {
     MetisGraph(const BlockGraph& g, int parts)
     {
         // A block heavier than a part is a part of its own whatever METIS does: to it, it weighs as much as a
-        // part, or its bisections would run out of blocks. Fewer parts are left for the lighter ones, hence
-        // in turn.
+        // part, or its bisections would run out of blocks. Fewer parts are left for the lighter ones, hence in turn.
         std::vector<double> load = g.work;
         std::ranges::sort(load, std::greater{});
         double all_work = std::accumulate(load.begin(), load.end(), 0.0), most = all_work;
@@ -455,8 +450,7 @@ Cut best_cut(const BlockGraph& g, int parts, Method method)
         best = std::move(*cut);
         report = r;
     };
-    // Bisection cuts best in most scenes, and fastest; it complains on standard output where it runs out of
-    // blocks.
+    // Bisection cuts best in most scenes, and fastest; it complains on standard output where it runs out of blocks.
     if (g.size() >= 3 * parts) consider(Way::Bisection);
     if (g.size() > small_graph) return best;
     if (metis.connected) consider(Way::ContiguousKway);
@@ -478,7 +472,7 @@ std::vector<int> partition(const BlockGraph& g, int parts, Method method, const 
 
 BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid& grid, int parts, Method method)
 {
-    ensure(lister.empty() || listed.size() == lister.size(), "every block is listed by somebody");
+    ensure(lister.empty() || listed.size() == lister.size(), "every block is listed by a rank");
     BlockCut cut{block_graph(listed, grid), {}, {}};
     const BlockGraph& g = cut.graph;
 

@@ -1,7 +1,6 @@
 #pragma once
 // Who gets which block of space: a graph of the blocks that hold soil, weighted by work and by halo bytes,
-// cut into parts of equal work with little halo. Serial and without MPI, so `kuzure scale` cuts for any
-// number of ranks.
+// cut into parts of equal work with little halo. Serial and without MPI, so `kuzure scale` cuts for any number of ranks.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -77,8 +76,7 @@ struct BlockGrid {
     double row_bytes = 128;
 };
 
-/// The occupied blocks, in lexicographic order, and their links to the 26 around them (across periodic axes
-/// too).
+/// The occupied blocks, in lexicographic order, and their links to the 26 around them (across periodic axes too).
 struct BlockGraph {
     struct Link {
         std::int32_t block;           // the neighbour
@@ -141,8 +139,7 @@ struct BlockCut {
 /// its work. Without listers labels are free: parts of neighbouring numbers lie near each other. Throws as block_graph().
 BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid&, int parts, Method = Method::Metis);
 
-/// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004)
-/// 381.
+/// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004) 381.
 std::uint64_t hilbert_index(std::array<std::uint32_t, 3> point, int bits);
 
 } // namespace kuzure

@@ -1,6 +1,5 @@
 #pragma once
-// When cutting anew pays. Decided from numbers that all ranks share; the decision never changes a bit of the
-// result.
+// When cutting anew pays. Decided from numbers that all ranks share; the decision never changes a bit of the result.
 #include "solver/core/team.hpp"
 
 namespace kuzure {
@@ -16,8 +15,7 @@ double imbalance(const Team&, double mine);
 /// with its sign (never below zero), so that noise cancels.
 class Rebalance {
 public:
-    /// `promised`: the imbalance that the first cut expects (CutReport::imbalance); `cut_seconds`: what it
-    /// cost.
+    /// `promised`: the imbalance that the first cut expects (CutReport::imbalance); `cut_seconds`: what it cost.
     explicit Rebalance(double promised = 1, double cut_seconds = 0);
 
     /// After every so many steps: the seconds this rank worked since the last call, waiting excluded. True,
@@ -34,7 +32,7 @@ public:
     double cut_seconds() const { return cost_; }
 
 private:
-    static constexpr double noticeable = 0.02; // idle share that nobody should act upon
+    static constexpr double noticeable = 0.02; // idle share below which imbalance is noise
     static constexpr int settling = 5;         // calls after a new cut that show what it achieved; the first is cold
     double floor_;                             // idle share that the present cut started from
     double cost_;                              // s

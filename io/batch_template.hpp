@@ -27,8 +27,8 @@ std::filesystem::path template_file(const std::string& name, const std::vector<s
 std::vector<std::string> batch_systems(const std::vector<std::filesystem::path>& folders);
 
 /// Fills a template. Its language, a line each: {{name}} anywhere; {{if name}}, {{if not name}}, {{end}} and {{include FILE}} alone on a
-/// line; lines that begin with ## are the template's own comments and go. Throws BadInput with `file:line: placeholder: expected, found,
-/// remedy`.
+/// line; lines that begin with ## are the template's own comments and go. Throws BadInput with
+/// `file:line: placeholder: expected, found, remedy`.
 std::string fill_template(const std::filesystem::path& file, const BatchValues&, const std::vector<std::filesystem::path>& folders);
 
 } // namespace kuzure::io

@@ -20,8 +20,7 @@ constexpr std::uint64_t longest_text = 64 << 20;  // bytes of manifest or header
 
 // ---- the checksum
 // ---------------------------------------------------------------------------------------------------- A sum
-// over rows of a hash of (row number, row): the same for any split of the rows over ranks, wrong for rows
-// swapped.
+// over rows of a hash of (row number, row): the same for any split of the rows over ranks, wrong for rows swapped.
 std::uint64_t mix(std::uint64_t h)
 {
     h = (h ^ (h >> 32)) * 0xd6e8feb86659fd93u;
@@ -65,8 +64,7 @@ std::span<const std::uint8_t> bytes_on_root(const Team& team, const std::string&
 
 std::string table_name(std::string_view field) { return fmt::format("/particles/{}", field); }
 
-// ---- reading
-// ---------------------------------------------------------------------------------------------------------
+// ---- reading --------------------------------------------------------------------------------------------------------
 struct FieldEntry {
     std::string name;
     int components;

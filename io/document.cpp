@@ -230,8 +230,8 @@ Document::Document(std::string_view text, std::string name, const KeyTable& keys
 
 void Document::complain(const std::string& path, const std::string& text)
 {
-    auto [place, line] = place_and_line(path);
-    problems_.push_back({line, path.empty() ? fmt::format("{}: {}", place, text) : fmt::format("{}: {}: {}", place, path, text)});
+    auto [location, line] = location_and_line(path);
+    problems_.push_back({line, path.empty() ? fmt::format("{}: {}", location, text) : fmt::format("{}: {}: {}", location, path, text)});
 }
 
 /// More problems than will be shown.
@@ -282,7 +282,7 @@ std::size_t Document::line_of(const std::string& path) const
     return line;
 }
 
-std::pair<std::string, std::size_t> Document::place_and_line(const std::string& path) const
+std::pair<std::string, std::size_t> Document::location_and_line(const std::string& path) const
 {
     for (auto it = sets_.rbegin(); it != sets_.rend(); ++it)
         if (path == it->first || path.starts_with(it->first + ".")) return {"--set " + it->second, 0};
@@ -294,7 +294,7 @@ std::pair<std::string, std::size_t> Document::place_and_line(const std::string& 
 
 void Document::override_with(const std::string& set)
 {
-    const auto place = "--set " + set;
+    const auto location = "--set " + set;
     refuse_bad_bytes(set, [&](std::size_t) { return std::string("--set"); });
     refuse_deep_keys(set, [&](std::size_t) { return std::string("--set"); });
     const auto equals = set.find('=');
@@ -307,7 +307,7 @@ void Document::override_with(const std::string& set)
     const std::string path = trim(set.substr(0, equals)), value = equals == set.npos ? "" : trim(set.substr(equals + 1));
     const auto parts = split(path);
     if (equals == set.npos || value.empty() || std::any_of(parts.begin(), parts.end(), [](const auto& p) { return p.empty(); }))
-        throw BadInput(place + ": expected key.path=value, for example --set space.spacing=0.02");
+        throw BadInput(location + ": expected key.path=value, for example --set space.spacing=0.02");
 
     const Key* key = keys_.find(path);
     const bool wants_text = !key || key->kind == Kind::Text || key->kind == Kind::Choice || key->kind == Kind::ChoiceOrTable;
@@ -317,7 +317,7 @@ void Document::override_with(const std::string& set)
     } catch (const toml::parse_error& e) {
         // A shell takes the quotes off strings.
         if (!wants_text)
-            throw BadInput(fmt::format("{}: {}: expected {}, found {}; write, for example, {}={}", place, path, key->expected(), value,
+            throw BadInput(fmt::format("{}: {}: expected {}, found {}; write, for example, {}={}", location, path, key->expected(), value,
                                        path, key->example));
     }
     const bool whole = parsed.size() == 1 && parsed.contains("v");
@@ -344,7 +344,7 @@ void Document::override_with(const std::string& set)
             const auto i = as_index(parts[k]);
             node = i ? array->get(*i) : nullptr;
             if (!node)
-                throw BadInput(fmt::format("{}: expected a number from 0 to {} after {}, found {}; the file has {} of them", place,
+                throw BadInput(fmt::format("{}: expected a number from 0 to {} after {}, found {}; the file has {} of them", location,
                                            std::int64_t(array->size()) - 1, parts[k - 1], parts[k], array->size()));
         } else node = nullptr;
         if (!node) break;
@@ -352,7 +352,7 @@ void Document::override_with(const std::string& set)
     auto* table = node ? node->as_table() : nullptr;
     if (!table)
         throw BadInput(
-            fmt::format("{}: expected a key inside a table, found {}, which is none; see the reference of its keys", place, path));
+            fmt::format("{}: expected a key inside a table, found {}, which is none; see the reference of its keys", location, path));
     if (!table->contains(parts.back())) made_.emplace_back(path, set);
     table->insert_or_assign(parts.back(), *parsed.get("v"));
     sets_.emplace_back(path, set);
@@ -384,7 +384,7 @@ std::vector<std::string> Document::names(const std::string& path) const
     }
     std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<std::string> names;
-    for (auto& [place, name] : found) names.push_back(std::move(name));
+    for (auto& [location, name] : found) names.push_back(std::move(name));
     return names;
 }
 

@@ -10,8 +10,7 @@
 #include <string>
 #include <string_view>
 #include <vector>
-// Compiled into us, toml++ 3.3 asserts what a file like "[[[" breaks, although the code behind the assertion
-// reports it.
+// Compiled into us, toml++ 3.3 asserts what a file like "[[[" breaks, although the code behind the assertion reports it.
 #define TOML_ASSERT(expression) static_assert(true)
 #include <toml++/toml.h>
 
@@ -37,7 +36,7 @@ public:
     void check();
 
     /// "scene.toml:12", or "--set time.step=1".
-    std::string place(const std::string& path) const { return place_and_line(path).first; }
+    std::string location(const std::string& path) const { return location_and_line(path).first; }
     /// Remembers a problem at this key.
     void complain(const std::string& path, const std::string& text);
     /// Throws BadInput with the problems so far, in the order of the file.
@@ -68,7 +67,7 @@ private:
     };
     bool has_enough() const;
     std::size_t line_of(const std::string& path) const;
-    std::pair<std::string, std::size_t> place_and_line(const std::string& path) const;
+    std::pair<std::string, std::size_t> location_and_line(const std::string& path) const;
     void override_with(const std::string& set);
     void complain_unknown(const std::string& path, std::string_view leaf, std::string_view pattern);
     void check_table(toml::table&, const std::string& path);

@@ -18,15 +18,14 @@ namespace {
 }
 
 /// What is at a place, or an errno.
-int look(const Place& place, struct stat& info)
+int status_of(const Place& place, struct stat& info)
 {
     return ::fstatat(place.from(), place.relative(), &info, place.held() ? AT_SYMLINK_NOFOLLOW : 0) == 0 ? 0 : errno;
 }
 
 } // namespace
 
-// ---- places
-// -----------------------------------------------------------------------------------------------------------------------------------
+// ---- places ---------------------------------------------------------------------------------------------------------
 void Descriptor::close()
 {
     if (fd_ >= 0) ::close(fd_);
@@ -55,7 +54,7 @@ Place hold(const Place& directory)
     if (fd < 0) {
         struct stat info;
         const int error = errno;
-        if (links && look(directory, info) == 0 && S_ISLNK(info.st_mode))
+        if (links && status_of(directory, info) == 0 && S_ISLNK(info.st_mode))
             throw IoFailed(fmt::format("{}: expected a directory, found a link: kuzure does not follow links out of a result directory. "
                                        "Remedy: move the directory itself to where there is room, or choose another with -o",
                                        directory.string()));
@@ -91,13 +90,13 @@ Descriptor create_file(const Place& place)
 FileIdentity identity(const Place& place)
 {
     struct stat info;
-    return look(place, info) == 0 ? FileIdentity{info.st_dev, info.st_ino} : FileIdentity{};
+    return status_of(place, info) == 0 ? FileIdentity{info.st_dev, info.st_ino} : FileIdentity{};
 }
 
 bool exists(const Place& place)
 {
     struct stat info;
-    return look(place, info) == 0;
+    return status_of(place, info) == 0;
 }
 
 std::vector<std::string> names_in(const Place& directory)
@@ -128,8 +127,7 @@ void make_directory(const Place& place)
     if (::mkdirat(place.from(), place.relative(), 0777) != 0 && errno != EEXIST) fail(place, "making the directory", errno);
 }
 
-// ---- ranks
-// ------------------------------------------------------------------------------------------------------------------------------------
+// ---- ranks ----------------------------------------------------------------------------------------------------------
 void agree(const Team& team, const std::string& complaint)
 {
     const auto none = std::int64_t(team.size());
@@ -157,8 +155,7 @@ void on_root(const Team& team, const std::function<void()>& work)
     throw IoFailed(outcome.substr(1));
 }
 
-// ---- contents
-// ---------------------------------------------------------------------------------------------------------------------------------
+// ---- contents -------------------------------------------------------------------------------------------------------
 std::uint64_t free_bytes(const Place& place)
 {
     struct statvfs disk;

@@ -1,5 +1,5 @@
 #pragma once
-// Plain files: written whole or not at all, under names that nobody else can turn elsewhere, and failures that reach every rank at
+// Plain files: written whole or not at all, under names that no other process can turn elsewhere, and failures that reach every rank at
 // once. No other file in io/ opens, renames or syncs a file by hand.
 #include "solver/core/ensure.hpp"
 #include "solver/core/team.hpp"
@@ -92,12 +92,10 @@ void remove_file(const Place&);
 /// Makes a directory if there is none. Throws IoFailed.
 void make_directory(const Place&);
 
-/// Collective. If any rank brings a complaint (not empty), all throw IoFailed with the lowest such rank's
-/// words.
+/// Collective. If any rank brings a complaint (not empty), all throw IoFailed with the lowest such rank's words.
 void agree(const Team&, const std::string& complaint);
 
-/// Collective. Rank 0 works; what it throws (BadInput, IoFailed, anything else as IoFailed) is thrown on
-/// every rank.
+/// Collective. Rank 0 works; what it throws (BadInput, IoFailed, anything else as IoFailed) is thrown on every rank.
 void on_root(const Team&, const std::function<void()>& work);
 
 /// Bytes an ordinary user may still write where this path lies or will lie.

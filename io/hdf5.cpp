@@ -45,8 +45,7 @@ hid_t native(Number n)
     throw Broken("a number type that HDF5 is not told about");
 }
 
-/// What the library has to say about its last failure: the words of the innermost call and the errno in them,
-/// if any.
+/// What the library has to say about its last failure: the words of the innermost call and the errno in them, if any.
 struct Complaint {
     std::string words;
     int error = 0;
@@ -210,7 +209,7 @@ void H5Writer::finish()
         if (complaint_.empty() && ::fsync(descriptor_) != 0)
             complaint_ = fmt::format("{}: bringing it to the disk failed: {}", file_.string(), cause(file_, errno));
     };
-    sync_mine(); // each rank its own writes: on a network file system nobody else can
+    sync_mine(); // each rank its own writes: on a network file system no other rank can
     agree(team_, complaint_);
     if (team_.rank() == 0) {
         const hid_t id = id_;
@@ -235,8 +234,7 @@ void H5Writer::publish()
     });
 }
 
-// ---- reading
-// -------------------------------------------------------------------------------------------------------
+// ---- reading --------------------------------------------------------------------------------------------------------
 void H5Reader::refuse(const std::string& why) const { throw IoFailed(fmt::format("{}: {}", file_.string(), why)); }
 
 H5Reader::H5Reader(const Place& file) : file_(file)

@@ -90,8 +90,7 @@ public:
     /// The names in a group, in order of the alphabet.
     std::vector<std::string> names(const std::string& group) const;
     bool has_attribute(const std::string& object, const std::string& attribute) const;
-    /// Refuses tables that are larger than the file, of unknown types, or stored in a way kuzure does not
-    /// write.
+    /// Refuses tables that are larger than the file, of unknown types, or stored in a way kuzure does not write.
     Table table(const std::string& name) const;
     /// Rows first .. first+count-1 of a table of T with that many components.
     template <class T>

@@ -36,8 +36,8 @@ private:
 };
 
 /// The HDF5 library from here on reports to us and not to the terminal, and does no clean-up when the program or MPI ends: every file is
-/// closed long before, and after a file that was damaged the clean-up crashes. To be called before MPI starts, or else HDF5 has MPI call
-/// it.
+/// closed long before, and after a file that was damaged the clean-up crashes. To be called before MPI starts, or else
+/// HDF5 has MPI call it.
 void quiet_hdf5();
 
 } // namespace kuzure::io

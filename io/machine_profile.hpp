@@ -74,8 +74,7 @@ const KeyTable& machine_keys();
 MachineProfile parse_machine_profile(std::string_view text, const std::filesystem::path& file,
                                      const std::vector<std::filesystem::path>& folders);
 
-/// A profile by path (with a slash or .toml), or by name from the folders, in their order. Throws BadInput that lists the
-/// names there are.
+/// A profile by path (with a slash or .toml), or by name from the folders, in their order. Throws BadInput that lists the names there are.
 MachineProfile read_machine_profile(const std::string& name_or_path, const std::vector<std::filesystem::path>& folders);
 
 } // namespace kuzure::io

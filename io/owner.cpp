@@ -217,7 +217,7 @@ Owner Owner::self()
 
 std::string Owner::words() const
 {
-    // Of a file that anybody may have written: no control characters to the terminal.
+    // Of a file that any user may have written: no control characters to the terminal.
     std::string all = fmt::format("process {} on host {}{}{}, since {}", pid, host, job.empty() ? "" : ", ", job, since);
     for (char& c : all)
         if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';

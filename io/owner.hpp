@@ -12,7 +12,7 @@ struct Owner {
     std::string job;                       // "Slurm job 12", or empty
     std::int64_t restarts = 0;             // of a job that the batch system requeued
     std::string since;                     // UTC
-    std::uint64_t directory = 0;           // number of the directory it owns: a copy of it is nobody's
+    std::uint64_t directory = 0;           // number of the directory it owns: a copy of it has no owner
 
     static Owner self();
     /// Host, process, job, since when.
@@ -25,15 +25,15 @@ public:
     static constexpr const char* file_name = "kuzure.lock";
     static constexpr int beat_seconds = 10, dead_after_seconds = 120;
 
-    /// Takes a directory that nobody owns, or whose owner is dead. A process of the same machine is known by its number and start; one of
-    /// another by its heartbeat, which is waited for up to two minutes (`say` gets a sentence then), or by its batch job, if that was
+    /// Takes a directory that no process owns, or whose owner is dead. A process of the same machine is known by its number and start; one
+    /// of another by its heartbeat, which is waited for up to two minutes (`say` gets a sentence then), or by its batch job, if that was
     /// requeued as this one. Throws BadInput naming a living owner and the remedy, IoFailed where the file system fails.
     Ownership(const Place& directory, const std::function<void(const std::string&)>& say);
     Ownership(const Ownership&) = delete;
     /// Gives it back.
     ~Ownership();
 
-    /// True once somebody else's name stands there, who took this process for dead while it was halted: nothing may be written any more.
+    /// True once another process's name stands there, which took this one for dead while it was halted: nothing may be written any more.
     /// Looks anew, and makes the file again where a hand removed it. Throws IoFailed.
     bool lost() const;
 

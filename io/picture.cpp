@@ -104,15 +104,15 @@ struct Painter::Stamps {
         row = (size + lanes - 1) / lanes * lanes;
         height.assign(std::size_t(steps * steps * size * row), -HUGE_VALF);
         light.assign(height.size(), 0);
-        for (int place = 0; place < steps * steps; ++place)
+        for (int offset = 0; offset < steps * steps; ++offset)
             for (int y = 0; y < size; ++y)
                 for (int x = 0; x < size; ++x) {
-                    const double dx = (x + 0.5 - middle - (place % steps + 0.5) / steps) / radius;
-                    const double dy = (y + 0.5 - middle - (place / steps + 0.5) / steps) / radius;
+                    const double dx = (x + 0.5 - middle - (offset % steps + 0.5) / steps) / radius;
+                    const double dy = (y + 0.5 - middle - (offset / steps + 0.5) / steps) / radius;
                     if (dx * dx + dy * dy > 1) continue;
                     const double nz = std::sqrt(std::max(0.0, 1 - dx * dx - dy * dy));
                     const double diffuse = std::max(0.0, -0.42 * dx - 0.60 * dy + 0.68 * nz); // light from the upper left, behind the eye
-                    const auto at = std::size_t((place * size + y) * row + x);
+                    const auto at = std::size_t((offset * size + y) * row + x);
                     height[at] = float(metres * nz);
                     light[at] = std::uint32_t(std::lround(full_light * (0.42 + 0.66 * diffuse)));
                 }
@@ -123,13 +123,13 @@ struct Painter::Stamps {
     void put(float* depth, std::uint32_t* kept, int width, int rows, double x, double y, float z, std::uint32_t code) const
     {
         const double fx = std::floor(x), fy = std::floor(y);
-        const int place = std::min(int((y - fy) * steps), steps - 1) * steps + std::min(int((x - fx) * steps), steps - 1);
+        const int offset = std::min(int((y - fy) * steps), steps - 1) * steps + std::min(int((x - fx) * steps), steps - 1);
         const int left = int(fx) - middle, top = int(fy) - middle;
         const int first = std::max(0, -top), last = std::min(size, rows - top), a = std::max(0, -left), b = std::min(row, width - left);
         const bool whole = a == 0 && b == row; // the usual case: whole registers
         for (int r = first; r < last; ++r) {
-            const float* h = &height[std::size_t((place * size + r) * row)];
-            const std::uint32_t* l = &light[std::size_t((place * size + r) * row)];
+            const float* h = &height[std::size_t((offset * size + r) * row)];
+            const std::uint32_t* l = &light[std::size_t((offset * size + r) * row)];
             const auto at = std::ptrdiff_t(top + r) * width + left;
             if (whole)
                 for (int k = 0; k < row; k += lanes) cover<lanes>(depth + at + k, kept + at + k, h + k, l + k, z, code);
@@ -226,14 +226,14 @@ void Painter::draw_walls(std::span<const Vector> walls)
     // Seen along the lattice, balls leave gaps: behind each stands a dark square.
     const bool backed = c.view != scene::View::Oblique;
     const int half = int(std::ceil(0.5 * spacing_ * c.scale * fine));
-    struct Place {
+    struct OnScreen {
         double x, y; // samples
         float depth; // m
     };
-    std::vector<Place> places;
+    std::vector<OnScreen> corners;
     for (const Vector& w : walls)
-        if (stage_.frame.holds(w, 1e-6 * spacing_)) places.push_back({fine * c.x(w), fine * c.y(w), float(c.depth(w))});
-    if (places.empty()) return;
+        if (stage_.frame.holds(w, 1e-6 * spacing_)) corners.push_back({fine * c.x(w), fine * c.y(w), float(c.depth(w))});
+    if (corners.empty()) return;
 
     // Bands of rows, so that the samples of one stay in the cache.
     const int rows = 48, bands = (stage_.height + rows - 1) / rows;
@@ -247,7 +247,7 @@ void Painter::draw_walls(std::span<const Vector> walls)
         for (int band = 0; band < bands; ++band) {
             const int top = fine * band * rows, high = fine * std::min(rows, stage_.height - band * rows);
             std::fill(samples.begin(), samples.end(), nothing);
-            for (const Place& p : places) {
+            for (const OnScreen& p : corners) {
                 const double py = p.y - top;
                 if (py < -stamps_->size || py > high + stamps_->size) continue;
                 stamps_->put(samples.data(), kept.data(), width, high, p.x, py, p.depth, 0);
@@ -417,14 +417,14 @@ std::shared_ptr<Painter::Scratch> Painter::borrow() const
 
 std::string Painter::draw(const Moment& moment) const
 {
-    ensure(moment.places.size() == moment.values.size(), "a picture needs one value a place");
+    ensure(moment.positions.size() == moment.values.size(), "a picture needs one value a position");
     const Camera& c = stage_.camera;
     const double reach = stamps_->radius + 2;
 
     // Where soil is in the picture: only there something has to be drawn.
     double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
     std::size_t outside = 0;
-    for (const Vector& p : moment.places) {
+    for (const Vector& p : moment.positions) {
         if (!stage_.frame.holds(p, spacing_)) {
             ++outside;
             continue;
@@ -446,8 +446,8 @@ std::string Painter::draw(const Moment& moment) const
         depth.assign(std::size_t(samples) * std::size_t(fine * height), nothing);
         kept.resize(depth.size());
         const double per_step = color_steps / (range_.high - range_.low);
-        for (std::size_t k = 0; k < moment.places.size(); ++k) {
-            const Vector& p = moment.places[k];
+        for (std::size_t k = 0; k < moment.positions.size(); ++k) {
+            const Vector& p = moment.positions[k];
             if (!stage_.frame.holds(p, spacing_)) continue;
             const double t = (moment.values[k] - range_.low) * per_step;
             const bool usable = std::isless(std::fabs(t), 1e100); // quietly, of not-a-number too
@@ -519,7 +519,8 @@ std::string Painter::draw(const Moment& moment) const
     canvas.text(right, 38, 24, moment.time, ink, Anchor::Right);
     picture.take(canvas, *palette_, {right - 240, 14, 280, 48});
     if (outside > 0) {
-        canvas.text(40, stage_.height - 16, 15, fmt::format("{} of {} particles are outside", outside, moment.places.size()), broken_red);
+        canvas.text(40, stage_.height - 16, 15, fmt::format("{} of {} particles are outside", outside, moment.positions.size()),
+                    broken_red);
         picture.take(canvas, *palette_, {30, stage_.height - 30, 500, 30});
     }
     if (moment.mark && stage_.frame.holds(*moment.mark, spacing_)) {

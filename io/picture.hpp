@@ -16,10 +16,10 @@ struct Quantity {
 
 /// One state of the soil.
 struct Moment {
-    std::span<const Vector> places;  // m
-    std::span<const double> values;  // one a place
-    std::string time;                // as it is written
-    std::optional<Vector> mark = {}; // m, what a red ring is drawn around, if it is in the frame
+    std::span<const Vector> positions; // m
+    std::span<const double> values;    // one a position
+    std::string time;                  // as it is written
+    std::optional<Vector> mark = {};   // m, what a red ring is drawn around, if it is in the frame
 };
 
 class Painter {
@@ -28,7 +28,7 @@ public:
     Painter(const Stage&, const ColorRange&, const Quantity&, const std::string& title, double spacing, std::span<const Vector> walls,
             bool flat);
     /// The bytes of a PNG file. A value that is no number shows red; what lies outside the frame is left out and counted in words. The
-    /// order of the places makes no difference. Any number of threads may draw at the same time. Throws IoFailed.
+    /// order of the positions makes no difference. Any number of threads may draw at the same time. Throws IoFailed.
     std::string draw(const Moment&) const;
     /// Letters of the title for which no font is here; empty if all is well.
     const std::string& missing() const { return missing_; }

@@ -46,14 +46,14 @@ Extent joined(const Extent& a, const Extent& b)
     return e;
 }
 
-Reach reach_of(std::span<const Vector> places, std::span<const double> values)
+Reach reach_of(std::span<const Vector> positions, std::span<const double> values)
 {
     Reach r;
     std::vector<double> v;
-    v.reserve(places.size());
+    v.reserve(positions.size());
     for (int c = 0; c < 3; ++c) {
         v.clear();
-        for (const Vector& p : places)
+        for (const Vector& p : positions)
             if (usable(axis(p, c))) v.push_back(axis(p, c));
         if (v.empty()) break;
         const auto [low, high] = std::minmax_element(v.begin(), v.end());

@@ -31,7 +31,7 @@ struct Reach {
     double percent_1 = HUGE_VAL, percent_99 = -HUGE_VAL; // of them, of each state
 };
 /// Values and places that are no numbers do not count.
-Reach reach_of(std::span<const Vector> places, std::span<const double> values);
+Reach reach_of(std::span<const Vector> positions, std::span<const double> values);
 Reach joined(const Reach&, const Reach&);
 
 /// The box to show: where soil comes to in the run, and the walls around it as far as they belong to it. Grains that fly out of all

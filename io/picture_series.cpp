@@ -129,7 +129,7 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
                 const SoilColor color(in, task.color);
                 if (!cut) break;
                 const auto soil = color.read(in);
-                const Reach r = reach_of(soil.places, {});
+                const Reach r = reach_of(soil.positions, {});
                 if (!r.all.empty()) middle = 0.5 * (r.all.low.y + r.all.high.y);
                 break;
             } catch (const IoFailed&) {
@@ -176,11 +176,11 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
         try {
             auto soil = read(s);
             std::vector<double> values;
-            std::vector<Vector> places;
-            for (std::size_t i = 0; i < soil.places.size(); ++i)
-                if (in_slice(soil.places[i])) values.push_back(soil.values[i]), places.push_back(soil.places[i]);
-            (soil.broken ? broken : reach)[std::size_t(k)] = reach_of(soil.places, values);
-            soil.places = std::move(places), soil.values = std::move(values);
+            std::vector<Vector> positions;
+            for (std::size_t i = 0; i < soil.positions.size(); ++i)
+                if (in_slice(soil.positions[i])) values.push_back(soil.values[i]), positions.push_back(soil.positions[i]);
+            (soil.broken ? broken : reach)[std::size_t(k)] = reach_of(soil.positions, values);
+            soil.positions = std::move(positions), soil.values = std::move(values);
             const std::lock_guard lock(saying);
             kept += soil.values.size() * (sizeof(Vector) + sizeof(double));
             if (kept <= keep_bytes) s.soil = std::move(soil), s.kept = true;
@@ -202,7 +202,7 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
     for (const auto& r : reach) all = joined(all, r);
     for (const auto& r : broken) failed = joined(failed, r);
     all = over_ranks(team, all), failed = over_ranks(team, failed);
-    // Of a state whose numbers failed, places and values can be anything.
+    // Of a state whose numbers failed, positions and values can be anything.
     if (all.all.empty()) all = failed;
 
     const int digits = decimals(states);
@@ -250,11 +250,12 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
                     if (!s.kept) {
                         s.soil = read(s);
                         std::size_t to = 0;
-                        for (std::size_t i = 0; i < s.soil.places.size(); ++i)
-                            if (in_slice(s.soil.places[i])) s.soil.places[to] = s.soil.places[i], s.soil.values[to++] = s.soil.values[i];
-                        s.soil.places.resize(to), s.soil.values.resize(to);
+                        for (std::size_t i = 0; i < s.soil.positions.size(); ++i)
+                            if (in_slice(s.soil.positions[i]))
+                                s.soil.positions[to] = s.soil.positions[i], s.soil.values[to++] = s.soil.values[i];
+                        s.soil.positions.resize(to), s.soil.values.resize(to);
                     }
-                    const Moment moment{s.soil.places, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits), s.soil.failed};
+                    const Moment moment{s.soil.positions, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits), s.soil.failed};
                     write_lightly(task.file ? task.file(s.number) : picture_file(task.results, s.number), painter.draw(moment));
                     s.soil = {};
                 } catch (const std::exception& e) {

@@ -1,6 +1,6 @@
 #pragma once
 // Where a run leaves its files: made once, never on top of another run's results, one writer at a time, and held: what is written goes
-// into the directory that was opened, also where somebody moves it or puts another in its place.
+// into the directory that was opened, also where it is moved or another put there.
 #include "io/file.hpp"
 #include "io/owner.hpp"
 

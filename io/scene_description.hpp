@@ -23,41 +23,44 @@ struct KeyInfo {
     Role role = Role::Physics; // of a section: of all its keys
 };
 
-// m; beyond it nobody means metres
-constexpr Range place = between(-1e9, 1e9), size = above_to(0, 1e9);
+// m; beyond it the number is not meant in metres
+constexpr Range coordinate = between(-1e9, 1e9), size = above_to(0, 1e9);
 
 template <class A> void describe_shape(A& a, const std::string& path, scene::Shape& shape)
 {
     a.template alternative<scene::Box>(
         path + ".box", shape, {.example = "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }", .doc = "a box of whole spacings a side"},
         [&](const std::string& p, auto& s) {
-            a.vector(p + ".low", s.low, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "lower corner"});
-            a.vector(p + ".high", s.high, {.unit = "m", .range = place, .example = "[1.0, 1.0, 1.0]", .doc = "upper corner"});
+            a.vector(p + ".low", s.low, {.unit = "m", .range = coordinate, .example = "[0.0, 0.0, 0.0]", .doc = "lower corner"});
+            a.vector(p + ".high", s.high, {.unit = "m", .range = coordinate, .example = "[1.0, 1.0, 1.0]", .doc = "upper corner"});
         });
     a.template alternative<scene::Cylinder>(
         path + ".cylinder", shape,
         {.example = "{ base = [0.0, 0.0, 0.0], radius = 0.1, height = 0.2 }", .doc = "an upright cylinder (3-D)"},
         [&](const std::string& p, auto& s) {
-            a.vector(p + ".base", s.base, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "centre of its lower face"});
+            a.vector(p + ".base", s.base,
+                     {.unit = "m", .range = coordinate, .example = "[0.0, 0.0, 0.0]", .doc = "centre of its lower face"});
             a.number(p + ".radius", s.radius, {.unit = "m", .range = size, .example = "0.1", .doc = "radius"});
             a.number(p + ".height", s.height, {.unit = "m", .range = size, .example = "0.2", .doc = "height along z"});
         });
     a.template alternative<scene::Sphere>(
         path + ".sphere", shape, {.example = "{ center = [0.0, 0.0, 0.0], radius = 0.1 }", .doc = "a sphere, in 2-D a disc"},
         [&](const std::string& p, auto& s) {
-            a.vector(p + ".center", s.center, {.unit = "m", .range = place, .example = "[0.0, 0.0, 0.0]", .doc = "centre"});
+            a.vector(p + ".center", s.center, {.unit = "m", .range = coordinate, .example = "[0.0, 0.0, 0.0]", .doc = "centre"});
             a.number(p + ".radius", s.radius, {.unit = "m", .range = size, .example = "0.1", .doc = "radius"});
         });
     a.template alternative<scene::Polygon>(
         path + ".polygon", shape,
         {.example = "{ points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], y = [0.0, 1.0] }", .doc = "a polygon in x-z, drawn out along y"},
         [&](const std::string& p, auto& s) {
-            a.points(
-                p + ".points", s.points,
-                {.unit = "m", .range = place, .example = "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]", .doc = "its corners [x, z] in order"});
+            a.points(p + ".points", s.points,
+                     {.unit = "m",
+                      .range = coordinate,
+                      .example = "[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]",
+                      .doc = "its corners [x, z] in order"});
             a.pair(p + ".y", s.y,
                    {.unit = "m",
-                    .range = place,
+                    .range = coordinate,
                     .optional = true,
                     .example = "[0.0, 1.0]",
                     .doc = "its extent along y; needed in 3-D, left out in 2-D"});
@@ -169,8 +172,9 @@ template <class A> void describe_effects(A& a, scene::Effects& effects)
             {.example = "{ table = [[0.0, 4.0], [20.0, 1.0]] }",
              .doc = "still pore water: buoyancy and seepage of a given water table; stresses are then effective"},
             [&](const std::string& p, auto& v) {
-                a.points(p + ".table", v.table,
-                         {.unit = "m", .range = place, .example = "[[0.0, 4.0], [20.0, 1.0]]", .doc = "its corners [x, z], x increasing"});
+                a.points(
+                    p + ".table", v.table,
+                    {.unit = "m", .range = coordinate, .example = "[[0.0, 4.0], [20.0, 1.0]]", .doc = "its corners [x, z], x increasing"});
                 a.number(p + ".density", v.density,
                          {.unit = "kg/m^3", .range = above(0), .fallback = "1000.0", .example = "1000.0", .doc = "density of the water"});
             });
@@ -282,10 +286,12 @@ template <class A> void describe(A& a, Scene& s)
              {.unit = "m", .range = between(1e-6, 1e6), .example = "0.04", .doc = "initial distance of particles"});
     a.number("space.h", s.space.h,
              {.unit = "spacings", .range = between(0.8, 3), .example = "1.3", .doc = "smoothing length; the support is 2 h"});
-    a.vector("space.low", s.space.low,
-             {.unit = "m", .range = place, .example = "[-1.0, -1.0, -0.5]", .doc = "lower corner of the box that particles may not leave"});
-    a.vector("space.high", s.space.high,
-             {.unit = "m", .range = place, .example = "[10.0, 10.0, 5.0]", .doc = "upper corner of the box that particles may not leave"});
+    a.vector(
+        "space.low", s.space.low,
+        {.unit = "m", .range = coordinate, .example = "[-1.0, -1.0, -0.5]", .doc = "lower corner of the box that particles may not leave"});
+    a.vector(
+        "space.high", s.space.high,
+        {.unit = "m", .range = coordinate, .example = "[10.0, 10.0, 5.0]", .doc = "upper corner of the box that particles may not leave"});
     a.axes("space.periodic", s.space.periodic,
            {.optional = true, .example = "[\"y\"]", .doc = "axes along which space repeats from low to high"});
 

@@ -134,10 +134,11 @@ std::string read_scene_text(const std::filesystem::path& path) { return read_doc
 
 Scene parse_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
 {
-    return parse_ready_scene(text, name, sets, limit).scene;
+    return parse_checked_scene(text, name, sets, limit).scene;
 }
 
-scene::Ready parse_ready_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit limit)
+scene::CheckedScene parse_checked_scene(std::string_view text, const std::string& name, std::span<const std::string> sets,
+                                        scene::StepLimit limit)
 {
     Document file(text, name, scene_keys(), sets);
     apply_preset(file.root);
@@ -154,14 +155,14 @@ scene::Ready parse_ready_scene(std::string_view text, const std::string& name, s
 
     scene::resolve(scene);
     scene::Issues issues;
-    auto ready = scene::ready(std::move(scene), limit, issues);
+    auto checked = scene::check_and_fill(std::move(scene), limit, issues);
     for (const auto& issue : issues)
         if (issue.severity == scene::Severity::Error)
             file.complain(issue.key, issue.other.empty()
                                          ? issue.text
-                                         : fmt::format("{} ({} is at {})", issue.text, issue.other, file.place(issue.other)));
+                                         : fmt::format("{} ({} is at {})", issue.text, issue.other, file.location(issue.other)));
     file.throw_if_any();
-    return std::move(*ready);
+    return std::move(*checked);
 }
 
 Scene read_scene(const std::filesystem::path& path, std::span<const std::string> sets, scene::StepLimit limit)

@@ -19,7 +19,8 @@ Scene parse_scene(std::string_view text, const std::string& name, std::span<cons
                   scene::StepLimit = scene::StepLimit::Enforce);
 
 /// The same, with its warnings and the particles it starts with.
-scene::Ready parse_ready_scene(std::string_view text, const std::string& name, std::span<const std::string> sets, scene::StepLimit);
+scene::CheckedScene parse_checked_scene(std::string_view text, const std::string& name, std::span<const std::string> sets,
+                                        scene::StepLimit);
 
 /// parse_scene of read_scene_text. Throws BadInput.
 Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {}, scene::StepLimit = scene::StepLimit::Enforce);
@@ -27,8 +28,7 @@ Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets
 /// The scene as TOML with every default written out; it reads back to the same scene bit for bit.
 std::string write_scene(const Scene&);
 
-/// 16 hexadecimal digits of all that changes the physics: everything but title, time.end, soil names and
-/// [output].
+/// 16 hexadecimal digits of all that changes the physics: everything but title, time.end, soil names and [output].
 std::string scene_hash(const Scene&);
 /// The first keys in which the physics of two scenes differ, with both values; empty where scene_hash is the same.
 std::string physics_difference(const Scene& was, const Scene& is);

@@ -178,8 +178,7 @@ Json table_schema(const std::string& pattern)
 std::string scene_reference()
 {
     std::string out = "# Scene file reference\n\n"
-                      "Lengths in m, masses in kg, times in s, stresses in Pa, angles in degrees. Tension is "
-                      "positive, z is up.\n"
+                      "Lengths in m, masses in kg, times in s, stresses in Pa, angles in degrees. Tension is positive, z is up.\n"
                       "Presence is the switch: what is not written is not simulated.\n";
     std::string section = "none";
     for (const Key& key : scene_keys()) {

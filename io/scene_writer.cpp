@@ -51,8 +51,7 @@ std::string toml_string(std::string_view s)
 /// What a Writer is for: a scene file, or the lines of which a hash is taken.
 enum class Purpose { File, Hash };
 
-/// Writes a scene as TOML. For a hash: whole paths, soils by number, decisions instead of "auto", no
-/// bookkeeping.
+/// Writes a scene as TOML. For a hash: whole paths, soils by number, decisions instead of "auto", no bookkeeping.
 class Writer {
 public:
     explicit Writer(Purpose purpose) : purpose_(purpose) {}

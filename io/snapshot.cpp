@@ -209,8 +209,7 @@ Path last_snapshot(const Path& results)
     return last;
 }
 
-// ---- series
-// ----------------------------------------------------------------------------------------------------------
+// ---- series ---------------------------------------------------------------------------------------------------------
 Snapshots::Snapshots(const Team& team, const Place& directory, std::optional<double> restart_time) : team_(team), directory_(directory)
 {
     if (!restart_time) return;

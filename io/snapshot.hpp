@@ -25,7 +25,7 @@ struct SnapshotLabel {
 std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>& fields);
 
 /// Collective; every rank brings its soil and its walls, or none. Needs the velocity, stress, density and
-/// origin columns where those fields are asked for; a plastic strain nobody carries is written as zero.
+/// origin columns where those fields are asked for; a plastic strain that the store does not hold is written as zero.
 /// Throws BadInput for an unknown field, IoFailed.
 void write_snapshot(const Team&, const Place& file, const Particles&, const WallPoints&, const SnapshotLabel&);
 

@@ -117,9 +117,9 @@ SoilColor::SoilColor(const H5Reader& in, const std::string& name) : name_(name),
     if (name == "speed") table_ = "velocity", of_ = Of::Length;
     else if (name == "pressure") table_ = "stress", of_ = Of::Pressure;
     else if (!in.has(data + name)) {
-        const auto cut = name.rfind('_');
-        table_ = name.substr(0, cut);
-        const std::string end = name.substr(cut);
+        const auto split = name.rfind('_');
+        table_ = name.substr(0, split);
+        const std::string end = name.substr(split);
         for (int c = 0; c < 3; ++c)
             if (end == of_vectors[c]) component_ = c;
         for (int c = 0; c < 6; ++c)
@@ -178,7 +178,7 @@ SoilColor::Soil SoilColor::read(const H5Reader& in) const
                 break;
             }
             }
-            s.places.push_back(at);
+            s.positions.push_back(at);
             s.values.push_back(value);
         });
     return s;

@@ -21,11 +21,11 @@ public:
     bool has_signs() const { return quantity_.map == Quantity::Map::Diverging; }
 
     struct Soil {
-        std::vector<Vector> places;   // m
-        std::vector<double> values;   // one a place
-        double time = 0;              // s
-        bool broken = false;          // the numbers failed in this state
-        std::optional<Vector> failed; // m, where; absent if that is no number either
+        std::vector<Vector> positions; // m
+        std::vector<double> values;    // one a position
+        double time = 0;               // s
+        bool broken = false;           // the numbers failed in this state
+        std::optional<Vector> failed;  // m, where; absent if that is no number either
     };
     /// The soil of a snapshot, in the file's order. Throws IoFailed.
     Soil read(const H5Reader&) const;

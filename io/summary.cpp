@@ -48,8 +48,7 @@ void write_summary(const Team& team, const Place& file, const Summary& summary) 
 
 void write_json(const Team& team, const Place& file, const ordered_json& value)
 {
-    // A message may carry bytes that are not UTF-8 (a file name): replaced, never a reason to lose the
-    // summary.
+    // A message may carry bytes that are not UTF-8 (a file name): replaced, never a reason to lose the summary.
     on_root(team, [&] { write_atomically(file, value.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"); });
 }
 

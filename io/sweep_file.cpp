@@ -279,10 +279,10 @@ private:
         for (std::size_t k = 0; k < count; ++k) {
             Settings settings = base;
             std::vector<std::string> words;
-            std::size_t rest = k;
+            std::size_t remainder = k;
             for (const auto& list : lists) {
-                const auto& value = list.values[rest % list.values.size()];
-                rest /= list.values.size();
+                const auto& value = list.values[remainder % list.values.size()];
+                remainder /= list.values.size();
                 settings.emplace_back(list.key, value);
                 if (list.key == "preset") words.push_back(value);
                 else if (list.key != "space.spacing")

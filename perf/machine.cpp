@@ -25,8 +25,7 @@ constexpr int register_bytes = 32, chains = 12; // of 16 registers
 constexpr int register_bytes = 16, chains = 12;
 #endif
 
-// The project compiles with -ffp-contract=off for equal bits; here the fused instruction is the very thing
-// measured.
+// The project compiles with -ffp-contract=off for equal bits; here the fused instruction is the very thing measured.
 template <class T> __attribute__((noinline, optimize("fp-contract=fast"))) T multiply_add(T factor, T summand, long rounds)
 {
     typedef T Vec __attribute__((vector_size(register_bytes)));

@@ -1,6 +1,5 @@
 #pragma once
-// What this machine can do at most: the roofs of the roofline, measured with the instruction set of this
-// build.
+// What this machine can do at most: the roofs of the roofline, measured with the instruction set of this build.
 #include <filesystem>
 #include <optional>
 #include <string>

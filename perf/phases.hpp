@@ -47,8 +47,7 @@ static_assert(std::ranges::none_of(phase_names, &std::string_view::empty), "ever
 constexpr std::string_view name(Phase phase) { return phase_names[int(phase)]; }
 
 /// Stopwatches of one rank, used by its main thread alone. Phases may nest: an inner phase stops the clock of
-/// the one around it, so that the rows add up to the whole. One clock reading at the start of a phase and one
-/// at its end.
+/// the one around it, so that the rows add up to the whole. One clock reading at the start of a phase and one at its end.
 class Timers {
 public:
     /// Run `work`, charge its time to `phase`, and hand back what it returns.
@@ -64,8 +63,7 @@ public:
         bytes_[int(phase)] += bytes;
     }
 
-    /// Time spent in a phase and in none inside it, s. For a phase that is running: until the last start or
-    /// end of one.
+    /// Time spent in a phase and in none inside it, s. For a phase that is running: until the last start or end of one.
     double seconds(Phase phase) const { return std::chrono::duration<double>(spent_[int(phase)]).count(); }
     std::int64_t calls(Phase phase) const { return calls_[int(phase)]; }
     double flops(Phase phase) const { return flops_[int(phase)]; }

@@ -149,8 +149,7 @@ std::string PhaseReport::text() const
     line("time                {:.3f} ms a step, {:.1f} ns a soil particle and step", 1e3 * each(total.max, work.steps),
          1e9 * each(total.max, work.particle_steps));
     if (pair_loop.max > 0) {
-        line("pair loop           {:.2f} ns a pair, {:.2f} Gflop/s, {:.2f} flop/byte, slowest rank {:.2f} of "
-             "the mean",
+        line("pair loop           {:.2f} ns a pair, {:.2f} Gflop/s, {:.2f} flop/byte, slowest rank {:.2f} of the mean",
              1e9 * each(pair_loop.max, work.pairs), pair_loop.gflops(), pair_loop.intensity(),
              pair_loop.mean > 0 ? pair_loop.max / pair_loop.mean : 0);
     }

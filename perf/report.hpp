@@ -56,8 +56,7 @@ struct PhaseReport {
     std::string text() const;
 };
 
-/// Bring the timers of all ranks together; collective, and the answer is the same on every rank. threads: of
-/// each rank.
+/// Bring the timers of all ranks together; collective, and the answer is the same on every rank. threads: of each rank.
 PhaseReport phase_report(const Timers&, const WorkDone&, int threads, const Team&);
 
 } // namespace kuzure

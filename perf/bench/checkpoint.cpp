@@ -70,7 +70,7 @@ try {
     const io::Path directory = argv[2];
     const double wanted = argc > 3 ? std::atof(argv[3]) : 1;
     const int rounds = argc > 4 ? std::max(1, std::atoi(argv[4])) : 5;
-    const Alone alone;
+    const SingleRank alone;
     Particles p;
     const auto source = io::read_checkpoint(alone, argv[1], p);
     repeat(p, Index(wanted * 1e6));

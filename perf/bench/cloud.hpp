@@ -112,7 +112,7 @@ struct Cloud {
         sort();
         build(model.cluster_width(), skin);
         model.make_records(particles, soils, {});
-        model.place_walls(scene, walls);
+        model.set_walls(scene, walls);
     }
     /// One whole step over all clusters.
     PassResult step(PairModel& model, const StepInput& in)

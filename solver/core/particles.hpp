@@ -1,6 +1,6 @@
 #pragma once
-// The soil particles of one rank, as a structure of arrays: one array per field component, allocated only if somebody
-// requires it. Owned particles only; ghosts live as packed records beside it (solver/neighbours/records.hpp).
+// The soil particles of one rank, as a structure of arrays: one array per field component, allocated only if some code
+// requires it. Owned particles only; ghosts live as packed records beside it (solver/pairs/record.hpp).
 #include "solver/core/ensure.hpp"
 #include "solver/core/field.hpp"
 #include "solver/core/memory.hpp"
@@ -65,7 +65,7 @@ public:
     template <class... F> void require(F... f) { (require_one(f), ...); }
     template <class F> bool has(F) const { return !columns<F>()[0].empty(); }
 
-    /// Columns of a field that is present. Throws Broken if nobody required it.
+    /// Columns of a field that is present. Throws Broken if it was not required.
     template <class F> auto operator[](F) { return view<F, typename F::Number>(*this); }
     template <class F> auto operator[](F) const { return view<F, const typename F::Number>(*this); }
 

@@ -1,6 +1,6 @@
 #pragma once
 // The ranks that work on one run, as everything outside decomposition/ sees them: no MPI type in sight.
-// decomposition::Comm implements it over MPI; Alone is the one-rank team of tests and of the library without MPI.
+// decomposition::Comm implements it over MPI; SingleRank is the one-rank team of tests and of the library without MPI.
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -28,7 +28,7 @@ public:
     virtual void broadcast(std::span<std::byte>, int root = 0) const = 0;
     /// Everybody's bytes on the root, by rank; empty elsewhere.
     virtual std::vector<std::vector<std::byte>> gather(std::span<const std::byte>, int root = 0) const = 0;
-    /// The communicator as the parallel file library wants it (MPI_Comm*), or nullptr for Alone.
+    /// The communicator as the parallel file library wants it (MPI_Comm*), or nullptr for SingleRank.
     virtual void* native() const = 0;
 
     /// True if it is true on every rank.
@@ -69,8 +69,8 @@ public:
     }
 };
 
-/// A team of one.
-class Alone final : public Team {
+/// One rank alone.
+class SingleRank final : public Team {
 public:
     using Team::broadcast;
     using Team::max;

@@ -21,10 +21,10 @@ struct StressDiffusion {
     {
         const double g = length(gravity);
         const Vector n = g > 0 ? (1 / g) * gravity : Vector{};
-        const V one(1), rest = one - K0;
+        const V one(1), anisotropy = one - K0;
         using T = number<V>;
-        return {fma(rest, V(T(n.x * n.x)), K0), fma(rest, V(T(n.y * n.y)), K0), fma(rest, V(T(n.z * n.z)), K0),
-                rest * V(T(n.x * n.y)),         rest * V(T(n.y * n.z)),         rest * V(T(n.x * n.z))};
+        return {fma(anisotropy, V(T(n.x * n.x)), K0), fma(anisotropy, V(T(n.y * n.y)), K0), fma(anisotropy, V(T(n.z * n.z)), K0),
+                anisotropy * V(T(n.x * n.y)),         anisotropy * V(T(n.y * n.z)),         anisotropy * V(T(n.x * n.z))};
     }
 
     template <class V> struct Sums {

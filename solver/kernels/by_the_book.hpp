@@ -98,7 +98,7 @@ struct Particle {
     Vector x, v;
     double density;
     Stress stress;
-    double volume, sound_speed;
+    double volume, c_p;
 };
 /// Soil as plain arrays of one length: m, m/s, kg/m^3, Pa, index into the soils.
 struct Soil {
@@ -142,7 +142,7 @@ inline Shown mirrored(const Particle& i, const WallPoint& j, const scene::Contac
     // where i touches the surface or is below it, the factor is at its cap
     const double quotient = nearest.distance > 0 ? both / nearest.distance : both > 0 ? largest : 1;
     const double factor = std::clamp(quotient, 1.0, largest);
-    return {{j.x, (1 - factor) * i.v, i.density, i.stress, volume, i.sound_speed}, nearest.normal};
+    return {{j.x, (1 - factor) * i.v, i.density, i.stress, volume, i.c_p}, nearest.normal};
 }
 
 /// All that decides the rates besides the state: kernel and effects, soils, walls, damping -damping v (1/s), and the wall law.
@@ -178,7 +178,7 @@ inline double viscosity(const scene::Viscosity& a, double h, const Particle& i, 
     const double approach = dot(v_ij, x_ij);
     if (approach >= 0) return 0;
     const double mu = h * approach / (dot(x_ij, x_ij) + 0.01 * h * h);
-    const double c = (i.sound_speed + j.sound_speed) / 2, rho = (i.density + j.density) / 2;
+    const double c = (i.c_p + j.c_p) / 2, rho = (i.density + j.density) / 2;
     return (-a.alpha * c * mu + a.beta * mu * mu) / rho;
 }
 /// f^n (tau_i + tau_j), f = W(r)/W(spacing). Monaghan (2000); Gray et al. (2001).
@@ -197,10 +197,10 @@ inline Stress stress_diffusion(double zeta, double h, Vector gravity, const Mate
     const Vector x_ij = i.x - j.x;
     const double size = length(gravity);
     const Vector down = size > 0 ? (1 / size) * gravity : Vector{};
-    const double along = -soil.density * dot(gravity, x_ij), across = soil.at_rest * along;
+    const double along = -soil.density * dot(gravity, x_ij), across = soil.K0 * along;
     const Stress down_down{down.x * down.x, down.y * down.y, down.z * down.z, down.x * down.y, down.y * down.z, down.x * down.z};
     const Stress at_rest = plus_isotropic((along - across) * down_down, across);
-    const double weight = 2 * zeta * h * soil.rod_speed * j.volume * dot(x_ij, grad) / (dot(x_ij, x_ij) + 0.01 * h * h);
+    const double weight = 2 * zeta * h * soil.c_bar * j.volume * dot(x_ij, grad) / (dot(x_ij, x_ij) + 0.01 * h * h);
     return weight * (i.stress - j.stress - at_rest);
 }
 /// sigma : C^-1 : D, the power (W/m^3) of a stress rate D (Pa/s) by Hooke's law.
@@ -276,7 +276,7 @@ inline Limited limit_to_friction(Vector force, Vector n, double friction_angle, 
 inline Particle particle(const Soil& soil, std::size_t k, const Setting& s)
 {
     const Material& m = s.soils[std::size_t(soil.soil[k])];
-    return {soil.x[k], soil.v[k], soil.density[k], soil.stress[k], m.density * s.volume() / soil.density[k], m.sound_speed};
+    return {soil.x[k], soil.v[k], soil.density[k], soil.stress[k], m.density * s.volume() / soil.density[k], m.c_p};
 }
 
 /// What one wall adds to particle i.
@@ -311,7 +311,7 @@ inline WallShare wall_share(int wall, std::span<const WallPoint> points, const S
     }
     if (w.surface == scene::Surface::Coulomb) {
         const Vector slip = i.v - dot(i.v, nearest.normal) * nearest.normal;
-        const double impedance = i.density * i.sound_speed * length(grad_one);
+        const double impedance = i.density * i.c_p * length(grad_one);
         const Limited limited = limit_to_friction(share.force, nearest.normal, w.friction_angle, slip, impedance);
         share.force = limited.force, share.sliding = limited.sliding, share.pulls = limited.pulls;
         if (limited.pulls) share.L = {};

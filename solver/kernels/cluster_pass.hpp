@@ -33,10 +33,10 @@ template <class U> struct LaneSoil {
 };
 template <class U> KUZURE_INLINE LaneSoil<U> soil_of(std::span<const Material> soils, const std::int32_t* soil, const Lanes& lanes)
 {
-    if (soils.size() == 1) return {Elastoplastic<U>::from(soils[0]), U(soils[0].sound_speed), U(soils[0].density)};
+    if (soils.size() == 1) return {Elastoplastic<U>::from(soils[0]), U(soils[0].c_p), U(soils[0].density)};
     const auto material = [&](int k) -> const Material& { return soils[soil[lanes.particle(k)]]; };
     return {lane_by_lane<Elastoplastic, U>([&](int k) { return Elastoplastic<double>::from(material(k)); }),
-            lane_by_lane<U>([&](int k) { return material(k).sound_speed; }), lane_by_lane<U>([&](int k) { return material(k).density; })};
+            lane_by_lane<U>([&](int k) { return material(k).c_p; }), lane_by_lane<U>([&](int k) { return material(k).density; })};
 }
 
 /// True in the lanes that this update writes: neither beyond the n-th nor asleep.
@@ -106,7 +106,7 @@ protected:
         : unit_(single<V> ? s.h : 1.0), dimensions_(s.dimensions), h_(s.h),
           volume_(s.dimensions == 3 ? s.spacing * s.spacing * s.spacing : s.spacing * s.spacing), model_(M::from(s, unit_)),
           // grad W in 1/m^(dimensions + 1) from sums in units of unit_
-          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), place_(s.h), water_(PoreWater::from(s.effects))
+          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), fixed_(s.h), water_(PoreWater::from(s.effects))
     {
     }
     std::string lanes_name() const
@@ -151,7 +151,7 @@ protected:
         const auto v = store[field::velocity];
         i.v = {load_narrow<V>(v.column[0] + i.first), load_narrow<V>(v.column[1] + i.first), load_narrow<V>(v.column[2] + i.first)};
         i.rho = load_narrow<V>(store[field::density].column[0] + i.first);
-        if (in.soils.size() == 1) i.c = V(T(in.soils[0].sound_speed));
+        if (in.soils.size() == 1) i.c = V(T(in.soils[0].c_p));
         else {
             T c[W];
             for (int k = 0; k < W; ++k) c[k] = speed(i.first + std::min(k, i.count - 1));
@@ -208,7 +208,7 @@ protected:
     double h_, volume_; // m, m^3 (m^2 in 2-D) of one particle at reference density
     M model_;
     double scale_;
-    FixedPoint<T> place_;
+    FixedPoint<T> fixed_;
     PoreWater water_;
 };
 

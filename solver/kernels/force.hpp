@@ -31,7 +31,7 @@ protected:
 
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
 
-    /// Geometry: r 3, r.r 5, reciprocal 1, length 1, t 2, shape and volume 8, grad W 3. Update: 60.
+    /// Geometry: r 3, r.r 5, reciprocal 1, length 1, t 2, F and volume 8, grad W 3. Update: 60.
     static Stage force_stage()
     {
         return {"force", sizeof(Stresses<T>) + (M::tensile ? sizeof(Tension<T>) : 0),
@@ -69,7 +69,7 @@ private:
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
     KUZURE_INLINE std::int64_t sum_forces(const Cluster<V>& i, std::span<const Index> near, ForceSums<Lane>& out) const
     {
-        const Kinematics<T>* places = kinematics_.data();
+        const Kinematics<T>* neighbours = kinematics_.data();
         const Stresses<T>* records = stresses_.data();
         const V support(T(2 * model_.kernel.h)), support2(T(4 * model_.kernel.h * model_.kernel.h));
         const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
@@ -87,12 +87,12 @@ private:
             for (int k = 0; k < batch.size; ++k) {
                 const Index number = batch.neighbour[k];
                 Entry<V>& e = batch.at[k];
-                const Vec3<V> r = i.position.minus(places[number]);
+                const Vec3<V> r = i.position.minus(neighbours[number]);
                 const V r2 = max(dot(r, r), tiny);
                 inside = inside + select(less(r2, support2), one, zero);
                 const auto inv = root<M::Kernel::divides>(r2);
                 const V t = max(support - inv.root, zero);
-                const V w = model_.kernel.shape(t, inv.root, inv.inverse_root) * records[number].volume;
+                const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * records[number].volume;
                 e.grad = w * r;
                 if constexpr (M::tensile) e.w = model_.kernel.value(t);
                 if constexpr (M::diffusive) {
@@ -130,7 +130,7 @@ private:
             pairs += std::popcount(hits & i.moving);
             const V support(T(2 * model_.kernel.h)), zero(T(0));
             const auto inv = root<M::Kernel::divides>(r2);
-            const Vec3<V> g = (m.factor * model_.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root)) * r;
+            const Vec3<V> g = (m.factor * model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root)) * r;
             const Vec3<V> traction = sigma * g;
             const Vec3<V> crossing = project(m, traction);
             const V slides = m.coulomb, holds = V(T(1)) - slides;
@@ -159,20 +159,20 @@ private:
         const U per_rho = factor / rho;
 
         const Vec3<U> stress = per_rho * (sums.force + sigma * sums.grad_one);
-        Vec3<U> pushed{zero, zero, zero}, wall = pushed;
+        Vec3<U> artificial{zero, zero, zero}, wall = artificial;
         if constexpr (M::tensile) {
             const auto tau = lane_by_lane<Sym3, U>([&](int k) {
                 const Tension<T>& t = tension_[lanes.particle(k)];
                 return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
             });
-            pushed = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
+            artificial = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
         }
-        std::apply([&](const auto&... term) { ((pushed = pushed + per_rho * term.force(sums)), ...); }, model_.more);
+        std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
         if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
         if (walled) wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho);
         else forget_contact(p, lanes);
         const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
-        Vec3<U> a = ((stress + viscous) + (pushed + wall)) + body;
+        Vec3<U> a = ((stress + viscous) + (artificial + wall)) + body;
         // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)
         const U mu(in.forces.damping), kick = half_dt + half_next;
         a = (U(1.0) / fma(half * mu, kick, U(1.0))) * (a - mu * u);
@@ -183,18 +183,18 @@ private:
         p[field::acceleration].store(lanes.at, a, lanes.n);
         if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) Below::detect_calm(in, lanes, a, v, awake);
 
-        tell(in, lanes, Moved{x, u, v, a}, Forces{viscous, pushed, wall}, U(volume_) * soil.rho0, walled, tally);
+        report(in, lanes, Moved{x, u, v, a}, Forces{viscous, artificial, wall}, U(volume_) * soil.rho0, walled, tally);
     }
     struct Moved { // after the step: place, velocity half a step before, velocity, acceleration
         Vec3<U> x, u, v, a;
     };
     struct Forces { // per unit of mass, m/s^2
-        Vec3<U> viscous, pushed, wall;
+        Vec3<U> viscous, artificial, wall;
     };
     /// Work of each force, half of the step before and half of the one to come; exact sums of rounded addends. Maxima; displacement and
     /// drift are those of the step to come.
-    KUZURE_INLINE void tell(const StepInput& in, const Lanes& lanes, const Moved& m, const Forces& f, U mass, bool walled,
-                            Tally<U>& tally) const
+    KUZURE_INLINE void report(const StepInput& in, const Lanes& lanes, const Moved& m, const Forces& f, U mass, bool walled,
+                              Tally<U>& tally) const
     {
         const auto& p = std::as_const(*in.particles);
         const U zero(0.0), half(0.5), half_dt = half * U(in.dt), next(in.next), half_next = half * next, mu(in.forces.damping);
@@ -206,7 +206,7 @@ private:
             later -= select(mine, quantized(mass * (half_next * dot(force, coming)), magic), zero);
         };
         take(tally.energy.viscous, tally.later.viscous, f.viscous);
-        if constexpr (M::pushes) take(tally.energy.stabilising, tally.later.stabilising, f.pushed);
+        if constexpr (M::pushes) take(tally.energy.stabilising, tally.later.stabilising, f.artificial);
         if (walled) take(tally.energy.wall, tally.later.wall, f.wall);
         if (in.forces.damping > 0) take(tally.energy.damping, tally.later.damping, -(half * mu) * (m.u + coming));
         const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
@@ -216,7 +216,7 @@ private:
         meet(tally.maxima.acceleration2, dot(m.a, m.a));
         meet(tally.maxima.displacement2, dot(moved, moved));
         meet(tally.maxima.speed2, dot(m.v, m.v));
-        meet(tally.maxima.drift2, dot(drift, drift));
+        meet(tally.maxima.half_step_speed2, dot(drift, drift));
         tally.poison += select(mine, fma(zero, dot(m.a, m.a), fma(zero, dot(m.v, m.v), zero * dot(m.x, m.x))), zero);
         if (in.low) {
             double at[3][16];
@@ -232,8 +232,8 @@ private:
         const auto material = [&](int k) -> const Material& {
             return in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][lanes.particle(k)]];
         };
-        const U speed = lane_by_lane<U>([&](int k) { return material(k).rod_speed; });
-        const U K0 = lane_by_lane<U>([&](int k) { return material(k).at_rest; });
+        const U speed = lane_by_lane<U>([&](int k) { return material(k).c_bar; });
+        const U K0 = lane_by_lane<U>([&](int k) { return material(k).K0; });
         const U strength = U(2 * model_.stress_diffusion.zeta * h_ * scale_ / unit_) * speed;
         const auto kept = p[field::stress_rate];
         Sym3<U> rate = model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));

@@ -16,7 +16,7 @@ template <int W> struct WallShare {
 
 template <class M, class V> class LeapFrog final : public ClusterPass<M, V> {
     using Base = ClusterPass<M, V>;
-    using Base::W, Base::unit_, Base::dimensions_, Base::h_, Base::volume_, Base::model_, Base::scale_, Base::place_, Base::water_;
+    using Base::W, Base::unit_, Base::dimensions_, Base::h_, Base::volume_, Base::model_, Base::scale_, Base::fixed_, Base::water_;
     using typename Base::T, typename Base::U;
 
     /// sum V_j rho_i rho_j Pi approach grad W: the power that viscosity takes.
@@ -34,7 +34,7 @@ public:
     explicit LeapFrog(const scene::Interactions& s) : Base(s)
     {
         const std::size_t row = sizeof(Record<T>) + (M::tensile ? sizeof(Tension<T>) : 0);
-        // Without terms: r 3, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, shape and volume 8, grad W 3;
+        // Without terms: r 3, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, F and volume 8, grad W 3;
         // viscosity: approach 6, pressure 6, on the diagonal 3, power 3.
         // Update: scaled sums 9, force 27, rates 25, rotation 110, two strain increments 50, two returns to the cone 80, values 70.
         // Columns read 23 and written 21, one record read and one written, four bytes a list entry.
@@ -73,19 +73,19 @@ public:
         for (Index i = 0; i < n; ++i) {
             const Material& m = soils[p[field::soil][i]];
             const double rho = p[field::density][i];
-            now_[i] = make_record<T>(place_, p[field::position][i], p[field::velocity][i], volume_ * m.density / rho, rho,
-                                     p[field::stress][i], m.sound_speed);
+            now_[i] = make_record<T>(fixed_, p[field::position][i], p[field::velocity][i], volume_ * m.density / rho, rho,
+                                     p[field::stress][i], m.c_p);
             if (sleepy) now_[i].awake = T(p[field::activity][i] == std::int32_t(Activity::Moves) ? 1 : 0);
             if constexpr (M::tensile) tension_[i] = make_tension<T>(p[field::stress][i], model_.artificial_stress.epsilon);
         }
         Record<T> far = far_away<T, Record>();
-        far.sound_speed = T(1);
+        far.c_p = T(1);
         for (std::size_t k = n; k < count; ++k) {
             now_[k] = next_[k] = far;
             if (M::tensile) tension_[k] = next_tension_[k] = {};
         }
     }
-    void place_walls(const Scene& scene, std::span<const WallPoints> points) override
+    void set_walls(const Scene& scene, std::span<const WallPoints> points) override
     {
         walls_.resize(points.size());
         for (std::size_t w = 0; w < points.size(); ++w) {
@@ -94,13 +94,13 @@ public:
             to.wall = &scene.walls[points[w].wall];
             to.x.resize(n), to.y.resize(n), to.z.resize(n);
             for (std::size_t k = 0; k < n; ++k)
-                to.x[k] = place_(points[w].x[k]), to.y[k] = place_(points[w].y[k]), to.z[k] = place_(points[w].z[k]);
+                to.x[k] = fixed_(points[w].x[k]), to.y[k] = fixed_(points[w].y[k]), to.z[k] = fixed_(points[w].z[k]);
         }
     }
     void pack(int, Index owned, Vector shift, std::byte* to) const override
     {
         Record<T> r = now_[owned];
-        r.x = place_.sum(r.x, place_(shift.x)), r.y = place_.sum(r.y, place_(shift.y)), r.z = place_.sum(r.z, place_(shift.z));
+        r.x = fixed_.sum(r.x, fixed_(shift.x)), r.y = fixed_.sum(r.y, fixed_(shift.y)), r.z = fixed_.sum(r.z, fixed_(shift.z));
         std::memcpy(to, &r, sizeof r);
         if constexpr (M::tensile) std::memcpy(to + sizeof r, &tension_[owned], sizeof(Tension<T>));
     }
@@ -130,7 +130,7 @@ private:
         Cluster<V> i = Base::cluster_at(in, cluster, tally);
         if (i.moving == 0) return copy_sleeping_records(in, cluster, i.first, i.count);
         const Record<T>* records = now_.data();
-        Base::load_lanes(i, in, records, [&](Index k) { return records[k].sound_speed; });
+        Base::load_lanes(i, in, records, [&](Index k) { return records[k].c_p; });
         const auto near = Base::near(i, in, cluster, records);
         Rows sums;
         // every particle meets itself once in its list
@@ -180,13 +180,13 @@ private:
                 const V rho_sum = i.rho + j.density;
                 const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
                 const V t = max(support - inv.root, zero);
-                const V w = model_.kernel.shape(t, inv.root, inv.inverse_root) * j.volume;
+                const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume;
                 e.grad = w * r;
                 e.v = v;
                 if constexpr (M::viscous) {
                     // rho_i rho_j Pi > 0 where the two approach
                     const V approach = max(dot(v, r), zero);
-                    const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.sound_speed)};
+                    const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.c_p)};
                     e.rho2_Pi = model_.viscosity(pair);
                     sums.viscous_power = fma(e.rho2_Pi * w, approach, sums.viscous_power);
                 }
@@ -251,7 +251,7 @@ private:
                 pairs += std::popcount(hits & i.moving);
                 const V rho_sum = i.rho + i.rho;
                 const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
-                const V w = model_.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root);
+                const V w = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root);
                 const Vec3<V> g = w * r;
                 const V factor = law.factor(WallPoint<V>{r, number, point}, here);
                 G = G + g;
@@ -275,7 +275,7 @@ private:
                 if (wall.wall->surface == scene::Surface::Coulomb) {
                     // scale, the kernel's constant, is negative: the force on the particle points along scale * force
                     const Vector slip = mirrored - c.colliding;
-                    const double impedance = p[field::density][at] * now_[at].sound_speed * length(scale_ * g);
+                    const double impedance = p[field::density][at] * now_[at].c_p * length(scale_ * g);
                     const auto limited = limit_to_friction(scale_ * force, c.normal, wall.wall->friction_angle, slip, impedance);
                     force = (1 / scale_) * limited.force;
                     mirrored = c.colliding + limited.drag * slip;
@@ -318,7 +318,7 @@ private:
     struct After { // half-step values _h, and those at the step's end
         Vec3<U> x, v_h, v;
         U rho_h, rho;
-        Yielded<U> h;
+        ReturnMapping<U> h;
         Sym3<U> sigma;
     };
 
@@ -355,9 +355,9 @@ private:
                 const Tension<T>& t = tension_[lanes.particle(k)];
                 return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
             });
-            const Vec3<U> pushed = tau * sums.closeness_grad + sums.art_stress_j;
-            f = f + pushed;
-            r.stressed = factor * dot(now.v, pushed);
+            const Vec3<U> artificial = tau * sums.closeness_grad + sums.art_stress_j;
+            f = f + artificial;
+            r.stressed = factor * dot(now.v, artificial);
         }
         if constexpr (M::corrected)
             if (model_.correct) {
@@ -371,8 +371,8 @@ private:
         };
         r.diffusion = {zero, zero, zero, zero, zero, zero};
         if constexpr (M::diffusive) {
-            const U speed = lane_by_lane<U>([&](int k) { return material(k).rod_speed; });
-            const U K0 = lane_by_lane<U>([&](int k) { return material(k).at_rest; });
+            const U speed = lane_by_lane<U>([&](int k) { return material(k).c_bar; });
+            const U K0 = lane_by_lane<U>([&](int k) { return material(k).K0; });
             const U strength = U(2 * model_.stress_diffusion.zeta * h_ * scale_ / unit_) * speed;
             r.diffusion = model_.stress_diffusion.rate(sums, now.sigma, soil.rho0, K0, strength, U(unit_));
             // sigma : C^-1 : D = s : dev(D)/(2 G) + I1 tr(D)/(9 K)
@@ -428,7 +428,7 @@ private:
         a.v_h = select(mine, a.v_h, p[field::half_velocity].template load<U>(lanes.at)), a.v = select(mine, a.v, now.v);
         a.rho_h = select(mine, a.rho_h, p[field::half_density].template load<U>(lanes.at)), a.rho = select(mine, a.rho, now.rho);
         a.h.sigma = select(mine, a.h.sigma, p[field::half_stress].template load<U>(lanes.at)), a.sigma = select(mine, a.sigma, now.sigma);
-        a.h.shear_strain = select(mine, a.h.shear_strain, U(0.0));
+        a.h.d_lambda = select(mine, a.h.d_lambda, U(0.0));
         if (in.remembering) a.h.opened = select(mine, a.h.opened, p[field::opened_volume].template load<U>(lanes.at));
     }
     KUZURE_INLINE void write_state(const StepInput& in, const Lanes& lanes, const After& a) const
@@ -441,7 +441,7 @@ private:
         p[field::half_density].store(at, a.rho_h, n), p[field::density].store(at, a.rho, n);
         p[field::half_stress].store(at, a.h.sigma, n), p[field::stress].store(at, a.sigma, n);
         const auto plastic = p[field::plastic_strain];
-        plastic.store(at, plastic.template load<U>(at) + a.h.shear_strain, n);
+        plastic.store(at, plastic.template load<U>(at) + a.h.d_lambda, n);
         if (in.remembering) p[field::opened_volume].store(at, a.h.opened, n);
     }
     /// Records for the next step's pairs.
@@ -454,12 +454,12 @@ private:
         for (int k = 0; k < 14; ++k) store(rows[k], columns[k]);
         for (int k = 0; k < lanes.n; ++k) {
             Record<T>& r = next_[lanes.at + k];
-            r.x = place_(rows[0][k]), r.y = place_(rows[1][k]), r.z = place_(rows[2][k]);
+            r.x = fixed_(rows[0][k]), r.y = fixed_(rows[1][k]), r.z = fixed_(rows[2][k]);
             r.vx = T(rows[3][k]), r.vy = T(rows[4][k]), r.vz = T(rows[5][k]);
             r.volume = T(rows[6][k]), r.density = T(rows[7][k]);
             r.xx = T(rows[8][k]), r.yy = T(rows[9][k]), r.zz = T(rows[10][k]);
             r.xy = T(rows[11][k]), r.yz = T(rows[12][k]), r.xz = T(rows[13][k]);
-            r.sound_speed = T(lane(soil.c, k)), r.awake = T(0);
+            r.c_p = T(lane(soil.c, k)), r.awake = T(0);
             if constexpr (M::tensile)
                 next_tension_[lanes.at + k] = make_tension<T>(
                     Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]}, model_.artificial_stress.epsilon);
@@ -483,7 +483,7 @@ private:
         // viscous power of i's half of its pairs: V_i/2 sum_j V_j rho_i rho_j Pi approach |grad W|/r
         // artificial stress takes -V v.f, stress diffusion -V sigma : C^-1 : D
         const U viscous = quantized(volume * (half * (-factor) * sums.viscous_power) * kick, magic);
-        const U worked = quantized(volume * a.h.work, magic);
+        const U worked = quantized(volume * a.h.plastic_work, magic);
         const U damped = quantized(volume * now.rho * mu_d * dot(now.v, now.v) * kick, magic);
         const U walled = quantized(volume * load<U>(share.power + lanes.first) * kick, magic);
         tally.energy.plastic += select(mine, worked, zero);
@@ -498,7 +498,7 @@ private:
         meet(tally.maxima.acceleration2, dot(r.a, r.a));
         meet(tally.maxima.displacement2, dot(moved, moved));
         meet(tally.maxima.speed2, dot(a.v, a.v));
-        meet(tally.maxima.drift2, dot(drift, drift));
+        meet(tally.maxima.half_step_speed2, dot(drift, drift));
         meet(tally.maxima.density_ratio, max(a.rho / soil.rho0, soil.rho0 / a.rho));
         meet(tally.maxima.signal, fma(U(h_), sqrt(contract(r.D, r.D)), soil.c));
         const U finite = fma(zero, dot(r.a, r.a), fma(zero, dot(a.v, a.v), fma(zero, trace(a.sigma), zero * a.rho)));

@@ -73,7 +73,7 @@ public:
     /// Records of owned particles, from their columns, and room for so many ghosts of these soils.
     virtual void make_records(const Particles&, std::span<const Material>, std::span<const std::int32_t> ghost_soil) = 0;
     /// The wall points near this rank's soil; the scene must outlive the model's use.
-    virtual void place_walls(const Scene&, std::span<const WallPoints>) = 0;
+    virtual void set_walls(const Scene&, std::span<const WallPoints>) = 0;
 
     /// True where a step first moves the particles by the acceleration they have (move()), which must be there at the start: stages run
     /// once with a step of no length. The length of the step to come is then decided one step ahead.

@@ -261,7 +261,7 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
     const auto mapped = return_to_cone(rotate(spin_increment(strain.L, dt), i.stress + loading) + loading, law, kept.opened);
     // d rho/dt = -rho tr L: (rho' - rho)/dt = -tr L (rho' + rho)/2
     const double change = dt / 2 * trace(strain.L);
-    Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.shear_strain, mapped.opened, 0, 0, 0};
+    Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.d_lambda, mapped.opened, 0, 0, 0};
     // The mean stress works on the strain and on the diffusion's elastic strain; what is not stored is plastic.
     const double mass = i.density * i.volume, volume = (mass / i.density + mass / next.density) / 2;
     const Stress mean = 0.5 * (i.stress + next.stress);

@@ -57,7 +57,7 @@ public:
             const Vector x = p[field::position][i], v = p[field::velocity][i];
             const Stress s = p[field::stress][i];
             const double rho = p[field::density][i], volume = volume_ * m.density / rho;
-            kinematics_[i] = {place_(x.x), place_(x.y), place_(x.z), T(v.x), T(v.y), T(v.z), T(volume), T(rho)};
+            kinematics_[i] = {fixed_(x.x), fixed_(x.y), fixed_(x.z), T(v.x), T(v.y), T(v.z), T(volume), T(rho)};
             const bool awake = sleepy && p[field::activity][i] == std::int32_t(Activity::Moves);
             stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
             if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
@@ -68,12 +68,12 @@ public:
             if (M::tensile) tension_[k] = {};
         }
         if (soils.size() > 1) {
-            for (Index i = 0; i < n; ++i) speed_[i] = T(soils[p[field::soil][i]].sound_speed);
-            for (std::size_t k = 0; k < ghost_soil.size(); ++k) speed_[n + k] = T(soils[ghost_soil[k]].sound_speed);
+            for (Index i = 0; i < n; ++i) speed_[i] = T(soils[p[field::soil][i]].c_p);
+            for (std::size_t k = 0; k < ghost_soil.size(); ++k) speed_[n + k] = T(soils[ghost_soil[k]].c_p);
             std::fill(speed_.begin() + n + ghost_soil.size(), speed_.end(), T(1));
         }
     }
-    void place_walls(const Scene& scene, std::span<const WallPoints> points) override
+    void set_walls(const Scene& scene, std::span<const WallPoints> points) override
     {
         const WallSurface surface(scene);
         walls_.assign(points.size(), {});
@@ -84,7 +84,7 @@ public:
             std::vector<std::vector<Face>> found(n);
 #pragma omp parallel for schedule(dynamic, 256)
             for (Index k = 0; k < n; ++k) {
-                to.x[k] = place_(points[w].x[k]), to.y[k] = place_(points[w].y[k]), to.z[k] = place_(points[w].z[k]);
+                to.x[k] = fixed_(points[w].x[k]), to.y[k] = fixed_(points[w].y[k]), to.z[k] = fixed_(points[w].z[k]);
                 surface.faces({points[w].x[k], points[w].y[k], points[w].z[k]}, 2 * h_, found[k]);
             }
             for (Index k = 0; k < n; ++k) {
@@ -104,7 +104,7 @@ public:
     {
         if (stage == 0) {
             Kinematics<T> r = kinematics_[owned];
-            r.x = place_.sum(r.x, place_(shift.x)), r.y = place_.sum(r.y, place_(shift.y)), r.z = place_.sum(r.z, place_(shift.z));
+            r.x = fixed_.sum(r.x, fixed_(shift.x)), r.y = fixed_.sum(r.y, fixed_(shift.y)), r.z = fixed_.sum(r.z, fixed_(shift.z));
             std::memcpy(to, &r, sizeof r);
             return;
         }
@@ -152,14 +152,14 @@ public:
                 const Material& m = in.soils[in.soils.size() == 1 ? 0 : soil[at + k]];
                 const Vector here = x[at + k], moving = v[at + k];
                 kinematics_[at + k] = {
-                    place_(here.x), place_(here.y), place_(here.z), T(moving.x), T(moving.y), T(moving.z), T(volume_ * m.density / density),
+                    fixed_(here.x), fixed_(here.y), fixed_(here.z), T(moving.x), T(moving.y), T(moving.z), T(volume_ * m.density / density),
                     T(density)};
             }
         }
     }
 
 protected:
-    using Base::unit_, Base::h_, Base::volume_, Base::model_, Base::place_;
+    using Base::unit_, Base::h_, Base::volume_, Base::model_, Base::fixed_;
     using typename Base::T, typename Base::U;
 
     std::size_t wall_bytes() const

@@ -47,7 +47,7 @@ protected:
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
 
-    /// Geometry: r and its half step 9, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, shape and volume 8, grad W 3;
+    /// Geometry: r and its half step 9, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, F and volume 8, grad W 3;
     /// viscosity: approach 6, pressure 6. Update: scaled sums 12, rotation 110, increments 40, return to the cone 40, energies 60.
     static Stage strain_stage()
     {
@@ -102,7 +102,7 @@ private:
                 const V rho_sum = i.rho + j.density;
                 const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
                 const V t = max(support - inv.root, zero);
-                e.grad = (model_.kernel.shape(t, inv.root, inv.inverse_root) * j.volume) * r;
+                e.grad = (model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume) * r;
                 e.v = v;
                 if constexpr (M::viscous) {
                     // rho_i rho_j Pi > 0 where the two approach
@@ -129,7 +129,7 @@ private:
             const V support(T(2 * model_.kernel.h)), softening(T(0.01 * model_.kernel.h * model_.kernel.h)), zero(T(0));
             const V rho_sum = i.rho + i.rho;
             const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
-            const Vec3<V> g = model_.kernel.shape(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
+            const Vec3<V> g = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
             const Vec3<V> Pv = m.factor * project(m, i.v);
             const V slides = m.coulomb, holds = V(T(1)) - slides;
             const auto add = [&](Vec3<V>& held, Vec3<V>& sliding, V v) {
@@ -185,8 +185,8 @@ private:
                 L = {correction * L.x, correction * L.y, correction * L.z};
             }
         if (walled) {
-            // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy in first order of
-            // dt
+            // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy
+            // in first order of dt
             const U grown = fma(half_dt, trace(L) + trace(at_walls), one);
             at_walls = {grown * at_walls.x, grown * at_walls.y, grown * at_walls.z};
         }
@@ -203,7 +203,7 @@ private:
         auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
-        Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.shear_strain, viscous};
+        Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
 
         const auto mine = written<U>(lanes);
         if (in.sleep == SleepStage::Frozen) {
@@ -221,7 +221,7 @@ private:
         p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
         write_stresses(in, lanes, soil, next);
 
-        tell(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
+        report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
     }
     struct Strain { // of one step: stress and density before and after, rate of strain, stress rate of the diffusion, L of the walls
         Sym3<U> before, after;
@@ -230,8 +230,8 @@ private:
         Mat3<U> at_walls;
     };
     /// Energies: plastic work is what the mean stress did less what is stored; exact sums of rounded addends. Maxima.
-    KUZURE_INLINE void tell(const StepInput& in, const Lanes& lanes, const Strain& s, const LaneSoil<U>& soil, bool walled,
-                            Tally<U>& tally) const
+    KUZURE_INLINE void report(const StepInput& in, const Lanes& lanes, const Strain& s, const LaneSoil<U>& soil, bool walled,
+                              Tally<U>& tally) const
     {
         const U zero(0.0), half(0.5), dt(in.dt), magic(magic_of(in.energy_unit));
         const auto mine = written<U>(lanes);

@@ -156,9 +156,9 @@ public:
             // distance of the cluster's box to the column, in plan
             const float dx = std::max({0.f, a.left - c.hi[0], c.lo[0] - a.right}),
                         dy = std::max({0.f, a.front - c.hi[1], c.lo[1] - a.back});
-            const float rest = reach_ * reach_ - dx * dx - dy * dy;
-            if (rest <= 0) continue;
-            const float dz = std::sqrt(rest), low = c.lo[2] - dz, high = c.hi[2] + dz;
+            const float height2 = reach_ * reach_ - dx * dx - dy * dy;
+            if (height2 <= 0) continue;
+            const float dz = std::sqrt(height2), low = c.lo[2] - dz, high = c.hi[2] + dz;
             while (a.begin > a.first && z[a.begin - 1] >= low) --a.begin;
             while (a.begin < a.last && z[a.begin] < low) ++a.begin;
             a.end = std::max(a.end, a.begin);
@@ -227,11 +227,11 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
 
     const int threads = omp_get_max_threads();
     soil_store_.resize(threads), wall_store_.resize(threads), pruned_store_.resize(threads);
-    struct Place {
+    struct Stored {
         int thread;
         std::size_t soil, walls;
     };
-    Array<Place> place(n);
+    Array<Stored> stored(n);
     std::vector<std::uint8_t> has_ghost(n, 0);
     std::size_t entries = 0, wall_entries = 0;
     const auto column_reach = [&](double w) { return std::int32_t(std::ceil(slack_reach / w)); };
@@ -262,7 +262,7 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
                     cl.add(
                         {float(owned.x[begin + k] - origin.x), float(owned.y[begin + k] - origin.y), float(owned.z[begin + k] - origin.z)});
                 first_[c] = begin, count_[c] = std::int8_t(members);
-                place[c] = {t, used, wall_used};
+                stored[c] = {t, used, wall_used};
                 const std::size_t before = used;
                 used = finders[0].append(cl, out, used, grower(out));
                 n_soil_[c] = Index(used - before);
@@ -294,9 +294,9 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
     entries_ = entries, wall_entries_ = wall_entries;
     interior_.clear(), rim_.clear();
     for (Index c = 0; c < n; ++c) {
-        soil_[c] = soil_store_[place[c].thread].data() + place[c].soil;
-        pruned_[c] = pruned_store_[place[c].thread].data() + place[c].soil;
-        walls_[c] = wall_store_[place[c].thread].data() + place[c].walls;
+        soil_[c] = soil_store_[stored[c].thread].data() + stored[c].soil;
+        pruned_[c] = pruned_store_[stored[c].thread].data() + stored[c].soil;
+        walls_[c] = wall_store_[stored[c].thread].data() + stored[c].walls;
         (has_ghost[c] ? rim_ : interior_).push_back(c);
     }
 }

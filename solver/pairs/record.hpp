@@ -18,7 +18,7 @@ template <class T> struct alignas(16 * sizeof(T)) Record {
     T vx, vy, vz;
     T volume, density;
     T xx, yy, zz, xy, yz, xz;
-    T sound_speed;
+    T c_p;
     T awake; // 1 where soil that may sleep was not calm when last detected, else 0
 };
 static_assert(sizeof(Record<double>) == 128 && sizeof(Record<float>) == 64);

@@ -20,16 +20,16 @@ using EnergySums = Energies<double>;
 
 /// The largest values of a step, over lanes, threads and ranks.
 template <class V> struct Maxima {
-    V acceleration2{}; // (m/s^2)^2
-    V signal{};        // c_p + h |D|, m/s
-    V displacement2{}; // squared displacement since the last sort, m^2
-    V speed2{};        // (m/s)^2
-    V drift2{};        // (m/s)^2, of the half-step velocity that moved the particle
-    V not_finite{};    // 1 where a number is not finite
-    V outside{};       // 1 where a particle left the box
-    V density_ratio{}; // max(rho/rho_0, rho_0/rho)
-    static constexpr std::tuple members{&Maxima::acceleration2, &Maxima::signal,     &Maxima::displacement2, &Maxima::speed2,
-                                        &Maxima::drift2,        &Maxima::not_finite, &Maxima::outside,       &Maxima::density_ratio};
+    V acceleration2{};    // (m/s^2)^2
+    V signal{};           // c_p + h |D|, m/s
+    V displacement2{};    // squared displacement since the last sort, m^2
+    V speed2{};           // (m/s)^2
+    V half_step_speed2{}; // (m/s)^2, of the half-step velocity that moves the particle; "drift2" in checkpoints
+    V not_finite{};       // 1 where a number is not finite
+    V outside{};          // 1 where a particle left the box
+    V density_ratio{};    // max(rho/rho_0, rho_0/rho)
+    static constexpr std::tuple members{&Maxima::acceleration2,    &Maxima::signal,     &Maxima::displacement2, &Maxima::speed2,
+                                        &Maxima::half_step_speed2, &Maxima::not_finite, &Maxima::outside,       &Maxima::density_ratio};
     static constexpr std::array<const char*, 8> names{"acceleration2", "signal",     "displacement2", "speed2",
                                                       "drift2",        "not_finite", "outside",       "density_ratio"};
     static_assert(std::tuple_size_v<decltype(members)> == names.size());

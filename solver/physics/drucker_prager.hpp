@@ -1,5 +1,5 @@
 #pragma once
-// Drucker-Prager soil: Hooke's law with the Jaumann rate, the yield cone and the closed-form way back to it.
+// Drucker-Prager soil: Hooke's law with the Jaumann rate, the yield cone and the closed-form return mapping.
 // Tension is positive. Legend: sigma Cauchy stress [Pa], s its deviator, I1 = tr sigma, J2 = s:s/2, L velocity gradient
 // [1/s], D and W its symmetric and skew parts, K and G bulk and shear modulus [Pa].
 #include "solver/core/tensor.hpp"
@@ -121,10 +121,10 @@ template <class V> KUZURE_INLINE Sym3<V> rotate(Vec3<V> w, Sym3<V> s)
     return {dot(ax, bx), dot(ay, by), dot(az, bz), dot(ax, by), dot(ay, bz), dot(ax, bz)};
 }
 
-template <class V> struct Yielded {
+template <class V> struct ReturnMapping {
     Sym3<V> sigma;
-    V shear_strain; // increment of the plastic multiplier
-    V work;         // sigma : d(eps_p), J/m^3
+    V d_lambda;     // increment of the plastic multiplier
+    V plastic_work; // sigma : d(eps_p), J/m^3
     V opened;       // volume strain that tension at the apex has opened and pressure has not closed
 };
 
@@ -134,7 +134,7 @@ template <class V> struct Yielded {
 /// Bui et al. (2008) with the return map of de Souza Neto et al. (2008). What tension opens at the apex is remembered, and I1 stays at zero
 /// under pressure until it is closed (Tampubolon et al. 2017; Dunatunga & Kamrin 2015): soil torn apart keeps its volume.
 ///     opened += (I1 - apex)+/(3 K);  closed = min(opened, (-I1)+/(3 K)),  I1 += 3 K closed,  opened -= closed.
-template <class V> KUZURE_INLINE Yielded<V> return_to_cone(Sym3<V> trial, const Elastoplastic<V>& soil, V opened = V(0))
+template <class V> KUZURE_INLINE ReturnMapping<V> return_to_cone(Sym3<V> trial, const Elastoplastic<V>& soil, V opened = V(0))
 {
     const V third(number<V>(1.0 / 3)), one(1);
     const V I1_trial = trace(trial);

@@ -1,11 +1,10 @@
 #pragma once
 // Smoothing kernels W(r, h) with support 2h. Legend: q = r/h, t = 2h - r where positive, else 0.
-// A kernel gives shape(t, r, 1/r) with
+// A kernel gives F(t, r, 1/r), (1/r) dW/dr without its constant, with
 //
-//     grad_i W_ij = scale * shape * (x_i - x_j)
+//     grad_i W_ij = scale * F * (x_i - x_j)
 //
-// so that the constant is taken out of the sums. shape is exactly zero beyond the support. Only a kernel that `divides` is given
-// 1/r.
+// so that the constant is taken out of the sums. F is exactly zero beyond the support. Only a kernel that `divides` is given 1/r.
 #include "solver/core/simd.hpp"
 #include <numbers>
 
@@ -22,7 +21,7 @@ struct CubicSpline {
     {
     }
     // dW/dr = -3/4 A/h [ (2 - q)+^2 - 4 (1 - q)+^2 ]
-    template <class V> KUZURE_INLINE V shape(V t, V, V inverse_r) const
+    template <class V> KUZURE_INLINE V F(V t, V, V inverse_r) const
     {
         const V u = max(fma(t, V(2), V(number<V>(-2 * h))), V(0)); // 2 h (1 - q)+
         return fnma(u, u, t * t) * inverse_r;
@@ -46,7 +45,7 @@ struct WendlandC2 {
     {
     }
     // (dW/dr)/r = -5 A/h^2 (1 - q/2)^3
-    template <class V> KUZURE_INLINE V shape(V t, V, V) const { return t * t * t; }
+    template <class V> KUZURE_INLINE V F(V t, V, V) const { return t * t * t; }
     /// W(r), 1/m^3 (1/m^2 in 2-D).
     template <class V> KUZURE_INLINE V value(V t) const
     {
@@ -66,7 +65,7 @@ struct WendlandC4 {
     {
     }
     // (dW/dr)/r = -14/3 A/h^2 (1 - q/2)^5 (1 + 5/2 q)
-    template <class V> KUZURE_INLINE V shape(V t, V r, V) const
+    template <class V> KUZURE_INLINE V F(V t, V r, V) const
     {
         const V t2 = t * t;
         return t2 * t2 * t * fma(r, V(number<V>(2.5 / h)), V(1));

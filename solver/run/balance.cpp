@@ -51,7 +51,7 @@ void Balance::cut_state(const Scene& scene, Particles& p, const Layout& layout, 
     for (Index i = 0; i < p.size(); ++i) count[domain_.block_of(p[field::position][i])] += 1;
     std::vector<BlockWork> work;
     for (const auto& [b, n] : count) work.push_back({b, n, n});
-    // Rows of a checkpoint lie anywhere: nobody can count pairs before a first cut has brought neighbours together.
+    // Rows of a checkpoint lie on any rank: no rank can count pairs before a first cut has brought neighbours together.
     const double begin = omp_get_wtime();
     const bool again = has_run && comm_.size() > 1;
     auto report = domain_.cut(work, again ? Method::Hilbert : Method::Metis, halo_, Labels::Free);
@@ -62,7 +62,7 @@ void Balance::cut_state(const Scene& scene, Particles& p, const Layout& layout, 
         domain_.migrate(p);
         rebuild();
     }
-    domain_.forget_far();
+    domain_.keep_neighbourhood();
     const double seconds = comm_.max(omp_get_wtime() - begin);
     rebalance_ = Rebalance(report.imbalance, seconds);
     full_ = {.imbalance = report.imbalance, .seconds = seconds};
@@ -80,7 +80,7 @@ void Balance::migrate(const Scene& scene, Particles& p, const Layout& layout, st
     const double begin = omp_get_wtime();
     if (now) cut(scene, p, layout, timers);
     migrated_ += domain_.migrate(p).left;
-    domain_.forget_far();
+    domain_.keep_neighbourhood();
     if (now) rebalance_.cut(comm_, omp_get_wtime() - begin);
 }
 
@@ -93,17 +93,17 @@ void Balance::cut(const Scene& scene, const Particles& p, const Layout& layout, 
     for (auto& b : mine) b.work *= factor;
     // Handing blocks to neighbours costs nearly nothing, a cut of the whole domain much. The latter is made when what the
     // former left behind has cost as much idle time as it will cost, or when its parts have become ragged.
-    full_.idle_cost += std::max(0.0, left_ - full_.imbalance - noise) * comm_.sum(busy_since_cut_) / comm_.size();
+    full_.idle_cost += std::max(0.0, cut_imbalance_ - full_.imbalance - noise) * comm_.sum(busy_since_cut_) / comm_.size();
     const bool again = full_.idle_cost > full_.seconds || (full_.halo_ratio > 0 && halo_share_ > ragged * full_.halo_ratio);
     timers.timed(Phase::Partition, [&] {
         if (again) {
             const auto report = domain_.cut(mine, Method::Metis, halo_);
             full_ = {.imbalance = report.imbalance, .seconds = report.seconds};
-            left_ = report.imbalance, halo_share_ = 0;
+            cut_imbalance_ = report.imbalance, halo_share_ = 0;
             ++full_partitions_;
         } else {
             const auto report = domain_.even_out(mine, halo_);
-            left_ = report.after, halo_share_ = report.halo;
+            cut_imbalance_ = report.after, halo_share_ = report.halo;
             if (full_.halo_ratio == 0) full_.halo_ratio = report.halo;
         }
     });
@@ -113,8 +113,7 @@ void Balance::cut(const Scene& scene, const Particles& p, const Layout& layout, 
 
 double Balance::cost_factor(double work) const
 {
-    // Seconds per unit of work against those of all ranks: what pairs do not explain, such as a slow node. Less than a
-    // tenth is noise.
+    // Seconds per unit of work against those of all ranks: what pairs do not explain, such as a slow node. Less than a tenth is noise.
     double all[] = {busy_since_cut_, work};
     comm_.sum(std::span<double>(all));
     if (!(busy_since_cut_ > 0.1) || !(work > 0) || !(all[0] > 0)) return 1;

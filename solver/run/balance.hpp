@@ -13,7 +13,7 @@ public:
     /// `recut_every`: cut anew at every so many list rebuilds, needed or not; 0: when it pays. Ghosts reach `reach` m.
     Balance(const Comm&, Domain&, double reach, double row_bytes, int recut_every);
 
-    /// The first cut, by counts of the scene's start: each rank counts a share of the blocks; nobody keeps a particle yet. Collective.
+    /// The first cut, by counts of the scene's start: each rank counts a share of the blocks; no rank keeps a particle yet. Collective.
     void cut_start(const Scene&, const scene::Filling&, Timers&);
     /// The first cut of a state whose particles lie on any rank; `rebuild` makes the lists by which pairs are counted. Collective.
     void cut_state(const Scene&, Particles&, const Layout&, bool has_run, const std::function<void()>& rebuild);
@@ -44,7 +44,7 @@ private:
     int recut_every_;
     Rebalance rebalance_;
     FullPartition full_;
-    double left_ = 1, halo_share_ = 0;            // of the last cut
+    double cut_imbalance_ = 1, halo_share_ = 0;   // of the last cut
     double busy_before_ = 0, busy_since_cut_ = 0; // s
     double imbalance_ = 1;
     std::int64_t migrated_ = 0, cuts_ = 0, full_partitions_ = 0;

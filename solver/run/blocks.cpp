@@ -45,8 +45,7 @@ scene::Box box_of(const BlockSpace& space, const Block& b, double margin)
     return {{low(0), low(1), low(2)}, {high(0), high(1), high(2)}};
 }
 
-// ---- counting
-// ---------------------------------------------------------------------------------------------------------
+// ---- counting -------------------------------------------------------------------------------------------------------
 namespace {
 
 /// Points in cells as wide as the support, to count neighbours of a few others.
@@ -118,10 +117,10 @@ template <class Visit> void BlockSoil::around(const Block& b, double reach, Visi
         for (d[1] = -r[1]; d[1] <= r[1]; ++d[1])
             for (d[2] = -r[2]; d[2] <= r[2]; ++d[2]) {
                 const Block there{b[0] + d[0], b[1] + d[1], b[2] + d[2]}, home = space_.wrapped(there);
-                std::array<std::int8_t, 3> turns{};
+                std::array<std::int8_t, 3> period_shift{};
                 for (int a = 0; a < 3; ++a)
-                    if (space_.period()[a]) turns[a] = std::int8_t((there[a] - home[a]) / space_.period()[a]);
-                visit(home, d, turns);
+                    if (space_.period()[a]) period_shift[a] = std::int8_t((there[a] - home[a]) / space_.period()[a]);
+                visit(home, d, period_shift);
             }
 }
 
@@ -143,10 +142,10 @@ StepWork BlockSoil::count(const Block& b) const
     for (const Vector& x : mine) box.add(x);
     const double support = scene_.support();
     const auto length = space_.period_length();
-    around(b, support, [&](const Block& home, const Block&, const std::array<std::int8_t, 3>& turns) {
+    around(b, support, [&](const Block& home, const Block&, const std::array<std::int8_t, 3>& period_shift) {
         some.clear();
         points(home, some);
-        const Vector shift{turns[0] * length[0], turns[1] * length[1], turns[2] * length[2]};
+        const Vector shift{period_shift[0] * length[0], period_shift[1] * length[1], period_shift[2] * length[2]};
         const double none[3] = {0, 0, 0};
         for (const Vector& x : some)
             if (squared_distance(x + shift, none, box) < support * support) theirs.push_back(x + shift);
@@ -167,7 +166,7 @@ StepWork BlockSoil::count(const Block& b) const
 
 StepWork BlockSoil::work(const Block& b) const
 {
-    const std::string like = next_block_holds(scene_.support()) ? likeness(b) : std::string();
+    const std::string like = next_block_holds(scene_.support()) ? pattern_key(b) : std::string();
     if (like.empty()) return count(b);
     {
         const std::lock_guard lock(mutex_);
@@ -178,13 +177,13 @@ StepWork BlockSoil::work(const Block& b) const
     return work_of_[like] = w;
 }
 
-BlockSoil::Watched BlockSoil::watched(const Block& b, int mine, const std::function<int(const Block&)>& owner_of, double reach) const
+BlockSoil::HaloDemand BlockSoil::halo_demand(const Block& b, int mine, const std::function<int(const Block&)>& owner_of, double reach) const
 {
     struct Sight {
         Block home;
         Block way;
         int owner;
-        std::array<std::int8_t, 3> turns;
+        std::array<std::int8_t, 3> period_shift;
     };
     std::vector<Sight> around_me;
     const auto length = space_.period_length();
@@ -192,16 +191,16 @@ BlockSoil::Watched BlockSoil::watched(const Block& b, int mine, const std::funct
     for (int a = 0; a < 3; ++a)
         if (space_.period()[a]) extent = std::max({extent, std::abs(space_.period_low()[a]), std::abs(length[a])});
     const double safe = halo_reach(reach, extent), reach2 = safe * safe;
-    around(b, safe, [&](const Block& home, const Block& way, const std::array<std::int8_t, 3>& turns) {
+    around(b, safe, [&](const Block& home, const Block& way, const std::array<std::int8_t, 3>& period_shift) {
         const int owner = owner_of(home);
-        if (owner < 0 || (owner == mine && turns == std::array<std::int8_t, 3>{})) return;
-        around_me.push_back({home, way, owner, turns});
+        if (owner < 0 || (owner == mine && period_shift == std::array<std::int8_t, 3>{})) return;
+        around_me.push_back({home, way, owner, period_shift});
     });
-    Watched result;
+    HaloDemand result;
     if (around_me.empty()) return result;
-    std::ranges::stable_sort(around_me, {}, [](const Sight& s) { return std::pair(s.owner, s.turns); });
+    std::ranges::stable_sort(around_me, {}, [](const Sight& s) { return std::pair(s.owner, s.period_shift); });
 
-    const std::string like = next_block_holds(safe) ? likeness(b) : std::string();
+    const std::string like = next_block_holds(safe) ? pattern_key(b) : std::string();
     std::vector<Vector> points_here;
     std::map<Block, Bounds> boxes; // by way
     const auto rows = [&](std::span<const Sight> sights) {
@@ -220,7 +219,8 @@ BlockSoil::Watched BlockSoil::watched(const Block& b, int mine, const std::funct
             Bounds box = Bounds::none();
             some.clear();
             points(s.home, some);
-            for (const Vector& x : some) box.add(x + Vector{s.turns[0] * length[0], s.turns[1] * length[1], s.turns[2] * length[2]});
+            for (const Vector& x : some)
+                box.add(x + Vector{s.period_shift[0] * length[0], s.period_shift[1] * length[1], s.period_shift[2] * length[2]});
             boxes[s.way] = box;
         }
         const double none[3] = {0, 0, 0};
@@ -235,16 +235,16 @@ BlockSoil::Watched BlockSoil::watched(const Block& b, int mine, const std::funct
     };
     for (std::size_t from = 0, to; from < around_me.size(); from = to) {
         const Sight& first = around_me[from];
-        for (to = from; to < around_me.size() && around_me[to].owner == first.owner && around_me[to].turns == first.turns;) ++to;
+        for (to = from; to < around_me.size() && around_me[to].owner == first.owner && around_me[to].period_shift == first.period_shift;)
+            ++to;
         const std::int64_t n = rows(std::span(around_me).subspan(from, to - from));
-        if (n > 0) result.by.push_back({first.owner, first.turns, n});
+        if (n > 0) result.by.push_back({first.owner, first.period_shift, n});
     }
     result.seen = rows(around_me);
     return result;
 }
 
-// ---- the soil of the start
-// --------------------------------------------------------------------------------------------
+// ---- the soil of the start ------------------------------------------------------------------------------------------
 std::vector<Block> StartSoil::blocks() const
 {
     // Body by body: what lies between bodies far apart is no block.
@@ -278,7 +278,7 @@ void StartSoil::points(const Block& b, std::vector<Vector>& to) const
     });
 }
 
-std::string StartSoil::likeness(const Block& b) const
+std::string StartSoil::pattern_key(const Block& b) const
 {
     const double dx = scene_.space.spacing, close = 1e-6;
     const Vector edge{space_.size()[0], space_.size()[1], space_.size()[2]}, slack{close * dx, close * dx, close * dx};
@@ -298,7 +298,7 @@ std::string StartSoil::likeness(const Block& b) const
                     for (int a = 0; a < 3; ++a) {
                         if (a == 1 && scene_.dimensions == 2) continue;
                         const double move = a == 0 ? shift.x : a == 1 ? shift.y : shift.z, low = space_.face(a, b[a]);
-                        // Points by block before, in and behind this one; where one lies on a face nobody can tell.
+                        // Points by block before, in and behind this one; where one lies on a face this is undefined.
                         int n[3] = {0, 0, 0};
                         for (std::int64_t q = 0; q < g.n[a]; ++q) {
                             const double in_blocks = (g.at(a, q) + move - low) / space_.size()[a], nearest = std::round(in_blocks);
@@ -314,8 +314,7 @@ std::string StartSoil::likeness(const Block& b) const
     return text;
 }
 
-// ---- the soil of a state
-// ----------------------------------------------------------------------------------------------
+// ---- the soil of a state --------------------------------------------------------------------------------------------
 StateSoil::StateSoil(const Scene& scene, const scene::Filling& filling, const BlockSpace& space, std::vector<Vector> x)
     : BlockSoil(scene, filling, space)
 {

@@ -49,25 +49,25 @@ public:
     /// What a block's step consists of.
     StepWork work(const Block&) const;
 
-    /// Somebody who needs to see a block's particles: an owner, seen directly or across periods.
-    struct Watcher {
+    /// A rank that needs particles of a block as ghosts, directly or across periods.
+    struct Receiver {
         int owner;
-        std::array<std::int8_t, 3> turns; // periods by which it lies away
-        std::int64_t rows;                // particles within reach of it
+        std::array<std::int8_t, 3> period_shift; // periods between the two
+        std::int64_t rows;                       // particles within reach of it
     };
-    struct Watched {
-        std::vector<Watcher> by;
-        std::int64_t seen = 0; // particles that anybody needs to see
+    struct HaloDemand {
+        std::vector<Receiver> by;
+        std::int64_t seen = 0; // particles that any rank needs as ghosts
     };
-    /// Who needs to see the particles of a block that `mine` owns; owner_of gives -1 for a block without soil.
-    Watched watched(const Block&, int mine, const std::function<int(const Block&)>& owner_of, double reach) const;
+    /// Which ranks need particles of a block that `mine` owns as ghosts; owner_of gives -1 for a block without soil.
+    HaloDemand halo_demand(const Block&, int mine, const std::function<int(const Block&)>& owner_of, double reach) const;
 
     const BlockSpace& space() const { return space_; }
 
 protected:
     /// A text that two blocks share only if they and the blocks around them hold soil and walls in the same places relative
-    /// to the block; empty where nobody can tell.
-    virtual std::string likeness(const Block&) const { return {}; }
+    /// to the block; empty where that is undefined.
+    virtual std::string pattern_key(const Block&) const { return {}; }
 
     const Scene& scene_;
     const scene::Filling& filling_;
@@ -93,7 +93,7 @@ public:
     void points(const Block&, std::vector<Vector>&) const override;
 
 protected:
-    std::string likeness(const Block&) const override;
+    std::string pattern_key(const Block&) const override;
 };
 
 /// The soil of a state: points in m, inside the periods. Throws NumbersFailed for a point that no block holds.

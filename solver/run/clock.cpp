@@ -19,8 +19,8 @@ double step_length(const Scene& scene, const Clock& clock)
     const double limit = std::min(h / clock.extremes.signal, a > 0 ? std::sqrt(h / a) : std::numeric_limits<double>::infinity());
     double dt = clock.step_scale * scene.accuracy.cfl * limit;
     // The geometry of mid-step holds for ways well below h: a fast impact shortens the staggered step.
-    if (scene.accuracy.scheme == scene::Scheme::Staggered && clock.extremes.drift2 > 0)
-        dt = std::min(dt, clock.step_scale * scene.accuracy.cfl * largest_way * h / std::sqrt(clock.extremes.drift2));
+    if (scene.accuracy.scheme == scene::Scheme::Staggered && clock.extremes.half_step_speed2 > 0)
+        dt = std::min(dt, clock.step_scale * scene.accuracy.cfl * largest_way * h / std::sqrt(clock.extremes.half_step_speed2));
     // The last step is shortened to end on time; a remainder of round-off is not a step.
     return clock.time + dt * (1 + 1e-9) >= end ? end - clock.time : dt;
 }

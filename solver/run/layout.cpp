@@ -21,9 +21,9 @@ void Layout::wrap_into_period(Particles& p) const
         double* x = p[field::position].column[axis];
         double* o = p[field::origin].column[axis];
         for (Index i = 0; i < p.size(); ++i) {
-            const double turns = std::floor((x[i] - a) / (b - a));
-            if (turns == 0) continue;
-            x[i] -= turns * (b - a), o[i] -= turns * (b - a);
+            const double periods = std::floor((x[i] - a) / (b - a));
+            if (periods == 0) continue;
+            x[i] -= periods * (b - a), o[i] -= periods * (b - a);
             x[i] = std::min(std::max(x[i], a), b);
         }
     };
@@ -127,7 +127,7 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
                 });
             }
     for (auto& w : walls_) w.sort(columns_);
-    model.place_walls(scene_, walls_);
+    model.set_walls(scene_, walls_);
 }
 
 void Layout::prepare_lists(StepInput& in, double way, double speed)

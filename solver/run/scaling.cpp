@@ -75,16 +75,16 @@ CutShare share_out(const BlockSoil& soil, int ranks, double reach, double row_by
         const int k = index[b];
         return k < 0 ? -1 : cut.owner[k];
     };
-    std::vector<BlockSoil::Watched> watched(g.block.size());
+    std::vector<BlockSoil::HaloDemand> demand(g.block.size());
 #pragma omp parallel for schedule(dynamic, 16)
-    for (int b = 0; b < g.size(); ++b) watched[b] = soil.watched(g.block[b], cut.owner[b], owner_of, reach);
+    for (int b = 0; b < g.size(); ++b) demand[b] = soil.halo_demand(g.block[b], cut.owner[b], owner_of, reach);
 
     std::vector<HaloMessage> rows;
     for (int b = 0; b < g.size(); ++b) {
         const int mine = cut.owner[b];
         s.rank[mine].work.add(weighed.work[b]);
-        s.rank[mine].seen += watched[b].seen;
-        for (const auto& w : watched[b].by) {
+        s.rank[mine].seen += demand[b].seen;
+        for (const auto& w : demand[b].by) {
             s.rank[w.owner].ghosts += w.rows;
             if (w.owner != mine) rows.push_back({mine, w.owner, w.rows});
         }

@@ -40,8 +40,7 @@ struct CutShare {
     /// Ghosts per owned particle.
     double ghost_share() const;
 };
-/// Cuts as a run on so many ranks would: of a start, or of a state. The blocks must be those of block_space() for as
-/// many ranks.
+/// Cuts as a run on so many ranks would: of a start, or of a state. The blocks must be those of block_space() for as many ranks.
 CutShare share_out(const BlockSoil&, int ranks, double reach, double row_bytes, Method = Method::Metis);
 
 } // namespace kuzure

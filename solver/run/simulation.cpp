@@ -31,14 +31,14 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         start_soil();
         if (options_.initial) options_.initial(particles_);
         model_->start(particles_);
-        double fastest = 0, drift = 0;
+        double fastest = 0, half_step = 0;
         for (Index i = 0; i < particles_.size(); ++i) {
             const Vector v = std::as_const(particles_)[field::velocity][i];
             fastest = std::max(fastest, dot(v, v));
             const Vector u = v - frame(0);
-            drift = std::max(drift, dot(u, u));
+            half_step = std::max(half_step, dot(u, u));
         }
-        clock_.extremes.speed2 = comm_.max(fastest), clock_.extremes.drift2 = comm_.max(drift);
+        clock_.extremes.speed2 = comm_.max(fastest), clock_.extremes.half_step_speed2 = comm_.max(half_step);
         clock_.energy_unit = energy_unit(energy_scale(scene_, filling_, soils_));
         if (options_.initial && clock_.extremes.speed2 > 0) { // particles may have been made faster than the scene says
             double mass = 0;
@@ -47,7 +47,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         }
         const Vector g = scene_.effects.gravity.value_or(Vector{});
         clock_.extremes.acceleration2 = dot(g, g);
-        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
         if (model_->moves_first()) evaluate_start();
         clock_.energy_at_start = ledger(clock_.next).sum(); // with the half kick to come before it, as at every other time
     });
@@ -118,14 +118,14 @@ Requests Simulation::step(Requests mine)
     StepInput in = step_input(dt, following_dt(dt));
     timers_.timed(Phase::Move, [&] { model_->move(in); });
     const bool rebuilt = layout_.outgrown(clock_.extremes.displacement2);
-    const double way = model_->moves_first() ? dt * std::sqrt(clock_.extremes.drift2) : 0;
+    const double way = model_->moves_first() ? dt * std::sqrt(clock_.extremes.half_step_speed2) : 0;
     if (model_->moves_first()) clock_.frame_way = clock_.frame_way + dt * frame(clock_.time + 0.5 * dt);
     if (rebuilt) rebuild(true, way);
     // The displacement that this step tells is that of the next one, or its own.
     const double after = model_->moves_first() ? in.next : dt, from = model_->moves_first() ? clock_.time + dt : clock_.time;
     in.frame = frame(from + 0.5 * after), in.frame_way = clock_.frame_way + after * in.frame;
     if (!model_->moves_first()) clock_.frame_way = in.frame_way;
-    layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.drift2));
+    layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.half_step_speed2));
     const PassResult result = run_stages(in);
     mine = end_step(in, result, mine);
     watch_.judge_step(particles_, clock_);
@@ -216,13 +216,13 @@ Requests Simulation::end_step(const StepInput& in, PassResult result, Requests m
         clock_.dissipated.add(std::exchange(clock_.later, {}));
         clock_.later.add(result.later, clock_.energy_unit);
     } catch (const NumbersFailed&) {
-        result.maxima.not_finite = 1; // for all ranks to judge together
+        result.maxima.not_finite = 1; // so that all ranks fail together
     }
     clock_.time = time_after(scene_, clock_, in.dt);
     clock_.step += 1, work_.steps += 1;
     clock_.dt = in.dt, clock_.next = following, clock_.frame = frame(clock_.time);
     mine = reduce(result, mine);
-    if (!model_->moves_first()) layout_.moved(in.dt * std::sqrt(clock_.extremes.drift2));
+    if (!model_->moves_first()) layout_.moved(in.dt * std::sqrt(clock_.extremes.half_step_speed2));
     return mine;
 }
 
@@ -242,7 +242,7 @@ Requests Simulation::reduce(const PassResult& result, Requests mine)
     });
     // Sleeping particles are not in the maxima: the step is never longer than the soil at rest allows.
     if (scene_.accuracy.sleep_below > 0)
-        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.sound_speed);
+        for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
     return mine;
 }
 
@@ -293,7 +293,7 @@ double Simulation::damping() const
     // mu_d = ratio * 2 omega_1, omega_1 = pi c_p/(2 H): critical for the lowest mode of a column of height H
     const auto& b = filling_.soil_bounds();
     double c = 0;
-    for (const auto& m : soils_) c = std::max(c, m.sound_speed);
+    for (const auto& m : soils_) c = std::max(c, m.c_p);
     return d->ratio * std::numbers::pi * c / (b.high.z - b.low.z + scene_.space.spacing);
 }
 
@@ -342,7 +342,7 @@ bool Simulation::roll_back()
     clock_.base_time = clock_.time, clock_.base_step = clock_.step;
     clock_.step_scale *= 0.5;
     // Cuts since then have moved blocks on, further than a rank knows.
-    domain_.know_again(last_good_->known);
+    domain_.restore_owners(last_good_->known);
     domain_.migrate(particles_);
     rebuild(false);
     if (model_->moves_first()) clock_.next = step_length(scene_, clock_);

@@ -1,6 +1,5 @@
 #pragma once
-// One run in memory: the particles of this rank and the time step. Everything a user sees of it (files, messages) is made by
-// solver/app.
+// One run in memory: the particles of this rank and the time step. Everything a user sees of it (files, messages) is made by solver/app.
 #include "perf/phases.hpp"
 #include "perf/report.hpp"
 #include "solver/kernels/pair_model.hpp"

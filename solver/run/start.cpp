@@ -38,7 +38,7 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
             if (domain.block_of(x) == b) start.push_back({id, x, body});
         });
     }
-    domain.forget_far();
+    domain.keep_neighbourhood();
     p.resize(Index(start.size()));
     ensure(comm.sum(std::int64_t(start.size())) == filling.soil_count(), "the ranks together do not hold the scene's soil");
     const InitialStress at_rest(scene, filling, soils);
@@ -83,7 +83,7 @@ double energy_scale(const Scene& scene, const scene::Filling& filling, std::span
         const Material& m = soils[body.soil];
         const double mass = m.density * scene.particle_volume() * double(filling.body_count(int(k)));
         const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing});
-        scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.sound_speed * m.sound_speed);
+        scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.c_p * m.c_p);
     }
     return scale;
 }

@@ -132,7 +132,7 @@ void Watch::judge_step(const Particles& p, const Clock& clock)
 {
     const Extremes& e = clock.extremes;
     const double h = scene_.smoothing_length();
-    const bool outran = std::sqrt(e.drift2) * clock.dt > h;
+    const bool outran = std::sqrt(e.half_step_speed2) * clock.dt > h;
     if (e.not_finite == 0 && e.outside == 0 && !outran && e.density_ratio < limit::density) return;
     // The lowest id among the offenders, so that the message does not depend on the ranks.
     std::int64_t lowest = std::numeric_limits<std::int64_t>::max();

@@ -205,14 +205,14 @@ double crossing_time(const Scene& scene, const Filling& filling)
 {
     double c = std::numeric_limits<double>::infinity();
     for (const Body& b : scene.bodies)
-        if (b.stress == InitialStress::AtRest) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).sound_speed);
+        if (b.stress == InitialStress::AtRest) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).c_p);
     return (filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing) / c;
 }
 
 double steps_to_settle(const Scene& scene, const Filling& filling)
 {
     double c = 0;
-    for (const Soil& soil : scene.soils) c = std::max(c, Material::from(soil).sound_speed);
+    for (const Soil& soil : scene.soils) c = std::max(c, Material::from(soil).c_p);
     return 8 * crossing_time(scene, filling) / scene.time.step.value_or(scene.accuracy.cfl * scene.smoothing_length() / c);
 }
 

@@ -96,16 +96,14 @@ void check_soils(const Scene& scene, Rules& rules)
             rules.error(key, "expected a soil with strength, found cohesion and friction_angle both 0; give one of them");
         if (soil.dilation_angle > soil.friction_angle)
             rules.error(key + ".dilation_angle", text("expected at most the friction angle, found {:.6g} deg > {:.6g} deg; with more, "
-                                                      "plastic flow "
-                                                      "would create energy",
+                                                      "plastic flow would create energy",
                                                       degrees(soil.dilation_angle), degrees(soil.friction_angle)));
         else if (soil.dilation_angle > 0)
             rules.warning(key + ".dilation_angle", "a constant dilation angle lets sheared soil swell "
                                                    "without end: read long run-outs with care");
         if (soil.tension_cutoff && m.alpha > 0 && 3 * *soil.tension_cutoff > m.k / m.alpha * (1 + 1e-12))
             rules.error(key + ".tension_cutoff", text("expected at most the cone's apex c cot(phi) = {:.6g} "
-                                                      "Pa, found {:.6g} Pa; lower it or leave "
-                                                      "it out",
+                                                      "Pa, found {:.6g} Pa; lower it or leave it out",
                                                       m.k / m.alpha / 3, *soil.tension_cutoff));
         if (soil.dilation_decay && soil.dilation_angle == 0)
             rules.warning(key + ".dilation_decay", "it changes nothing: dilation_angle is 0");
@@ -152,8 +150,7 @@ void check_shape(const Scene& scene, const Shape& shape, const std::string& key,
                         text("expected at most {} corners, found {}; leave out some", most_corners, p->points.size()));
         else if (crosses_itself(*p))
             rules.error(key + ".polygon.points", "expected a polygon whose edges meet at their corners only, found one that crosses "
-                                                 "or repeats "
-                                                 "itself; name the corners in order, the first not again at the end");
+                                                 "or repeats itself; name the corners in order, the first not again at the end");
         if (!flat && !(p->y[0] < p->y[1]))
             rules.error(key + ".polygon.y",
                         p->y[0] == 0 && p->y[1] == 0
@@ -233,8 +230,7 @@ void check_bodies(const Scene& scene, Rules& rules)
         double thickness = std::min(box.high.x - box.low.x, box.high.z - box.low.z);
         if (!flat) thickness = std::min(thickness, box.high.y - box.low.y);
         if (thickness < scene.support() * (1 - 1e-9))
-            rules.warning(key, text("the wall is {:.6g} m thick, thinner than the support of {:.6g} m: soil "
-                                    "at its face feels "
+            rules.warning(key, text("the wall is {:.6g} m thick, thinner than the support of {:.6g} m: soil at its face feels "
                                     "only a part of it; make it {} spacings thick",
                                     thickness, scene.support(), int(std::ceil(2 * scene.space.h - 1e-9))));
     }
@@ -257,8 +253,8 @@ void check_effects(const Scene& scene, Rules& rules)
                                                                 water->table[k][0], water->table[k - 1][0]));
     }
     if (effects.stress_diffusion && effects.stress_diffusion_decision == Decision::AsWritten)
-        if (const auto doubt = no_static_part(scene); !doubt.empty())
-            rules.warning("effects.stress_diffusion", "it smooths what should not be smooth: " + doubt);
+        if (const auto reason = no_static_part(scene); !reason.empty())
+            rules.warning("effects.stress_diffusion", "it smooths what should not be smooth: " + reason);
     if (effects.damping && effects.damping->until > scene.time.end)
         rules.warning("effects.damping.until",
                       text("damping lasts beyond the end of the run ({} s > {} s)", effects.damping->until, scene.time.end));
@@ -267,7 +263,7 @@ void check_effects(const Scene& scene, Rules& rules)
         rules.warning("effects.artificial_stress", "it is asked for and costs time, but " + why_no_tension(scene));
 }
 
-/// Numbers that are allowed but that hardly anybody means: nearly always a unit, a factor of 1e3 or radians.
+/// Numbers that are allowed but hardly ever meant: nearly always a unit, a factor of 1e3 or radians.
 void check_plausible(const Scene& scene, Rules& rules)
 {
     const auto angle_in_radians = [&](const std::string& key, double angle) {
@@ -277,7 +273,7 @@ void check_plausible(const Scene& scene, Rules& rules)
     };
     for (const auto& soil : scene.soils) {
         const std::string key = "soil." + soil.name;
-        const double c_p = Material::from(soil).sound_speed, rho = soil.density;
+        const double c_p = Material::from(soil).c_p, rho = soil.density;
         // Below and above, squares and steps leave the range of double precision.
         if (!(c_p > 1e-6 && c_p < 1e12)) {
             rules.error(key + ".young", text("expected a P-wave speed between 1e-6 and 1e12 m/s, found {:.3g} m/s from young = {:.6g} Pa "
@@ -308,9 +304,8 @@ void check_plausible(const Scene& scene, Rules& rules)
                                                         w->slip, scene.support()));
         if (const auto& r = soil.rate_friction; r && r->grain > 2 * scene.space.spacing)
             rules.warning(key + ".rate_friction.grain",
-                          text("grains of {:.4g} m are larger than the particles they make up, {:.4g} m apart: "
-                               "it is in m",
-                               r->grain, scene.space.spacing));
+                          text("grains of {:.4g} m are larger than the particles they make up, {:.4g} m apart: it is in m", r->grain,
+                               scene.space.spacing));
     }
     for (std::size_t w = 0; w < scene.walls.size(); ++w)
         if (scene.walls[w].surface == Surface::Coulomb)
@@ -400,8 +395,7 @@ void check_inside(const Scene& scene, Rules& rules)
                          slack = std::max(1e-6 * space.spacing, rounding_of(std::max(std::abs(low), std::abs(high))));
             if (at(box.low, axis) < low - slack || at(box.high, axis) > high + slack)
                 return rules.error(key,
-                                   text("expected it inside space.low .. space.high = {:.6g} .. {:.6g} m "
-                                        "along {}, found {:.6g} "
+                                   text("expected it inside space.low .. space.high = {:.6g} .. {:.6g} m along {}, found {:.6g} "
                                         ".. {:.6g} m; move it or widen the space",
                                         low, high, "xyz"[axis], at(box.low, axis), at(box.high, axis)),
                                    "space.low");
@@ -418,7 +412,7 @@ void check_inside(const Scene& scene, Rules& rules)
 double crossing_time(const Scene& scene)
 {
     double least = std::numeric_limits<double>::infinity();
-    for (const auto& soil : scene.soils) least = std::min(least, scene.smoothing_length() / Material::from(soil).sound_speed);
+    for (const auto& soil : scene.soils) least = std::min(least, scene.smoothing_length() / Material::from(soil).c_p);
     return least;
 }
 double courant_limit(const Scene& scene)
@@ -445,7 +439,7 @@ double courant_limit(const Scene& scene)
     if (scene.effects.stress_diffusion)
         for (const auto& soil : scene.soils)
             diffusion = std::max(diffusion, 2 * scene.effects.stress_diffusion->zeta * std::sqrt(soil.young / soil.density) /
-                                                Material::from(soil).sound_speed);
+                                                Material::from(soil).c_p);
     double limit = std::numeric_limits<double>::infinity();
     for (const Vector way : {Vector{1, 0, 0}, Vector{1, 0, 1}, Vector{1, 1, 1}}) {
         if (scene.dimensions == 2 && way.y != 0) continue;
@@ -481,7 +475,7 @@ double recommended_courant(const Scene& scene) { return scene.accuracy.scheme ==
 double recommended_step(const Scene& scene) { return recommended_courant(scene) * crossing_time(scene); }
 std::int64_t sleep_interval(const Scene& scene)
 {
-    // n steps after the look at everybody the first neighbours may have changed: n dt c_p <= 2 h
+    // n steps after all particles were checked for calm, the first neighbours may have changed: n dt c_p <= 2 h
     const double courant = scene.time.step ? *scene.time.step / crossing_time(scene) : scene.accuracy.cfl;
     return 1 + std::int64_t(std::min(2 / courant, 1e6));
 }
@@ -517,17 +511,17 @@ void resolve(Scene& scene)
     else note("artificial_stress", false, automatic ? why_no_tension(scene) : unwritten);
 
     const bool smoothing = effects.stress_diffusion_decision == Decision::Auto;
-    const std::string doubt = no_static_part(scene);
+    const std::string reason = no_static_part(scene);
     if (smoothing) {
         effects.stress_diffusion.reset();
-        if (doubt.empty()) effects.stress_diffusion = StressDiffusion{};
+        if (reason.empty()) effects.stress_diffusion = StressDiffusion{};
     }
     if (const auto& d = effects.stress_diffusion)
         note("stress_diffusion", true,
              text("zeta = {:.6g}: {}", d->zeta,
                   smoothing ? "one soil on level ground, noise of the spacing's length can be told from stress"
                             : "as written in the scene"));
-    else note("stress_diffusion", false, smoothing ? doubt : unwritten);
+    else note("stress_diffusion", false, smoothing ? reason : unwritten);
 
     if (const auto& w = effects.pore_pressure)
         note("pore_pressure", true,
@@ -645,11 +639,11 @@ void check_edges(const Scene& scene, Rules& rules)
 Issues check(const Scene& scene, StepLimit limit)
 {
     Issues issues;
-    ready(scene, limit, issues);
+    check_and_fill(scene, limit, issues);
     return issues;
 }
 
-std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
+std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues& issues)
 {
     Rules rules;
     check_space(scene, rules);
@@ -668,8 +662,8 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     }
     if (filling) {
         check_edges(scene, rules);
-        for (auto& judgement : judge(scene, *filling))
-            if (!judgement.doubt.empty()) rules.warning(judgement.name, judgement.doubt);
+        for (auto& n : dimensionless_numbers(scene, *filling))
+            if (!n.warning.empty()) rules.warning(n.name, n.warning);
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)
             if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess + 1e-9)
                 rules.warning(text("body.{}.{}", b, name_of(scene.bodies[b].shape)),
@@ -679,9 +673,8 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
         if (const auto why = scene.start.from.empty() ? no_closed_form(scene, *filling) : std::string(); !why.empty())
             scene.notes.push_back(
                 {"settling",
-                 text("the stress \"at rest\" is no closed form: {}; the soil settles under damping before t = 0, about {:.0f} "
-                      "steps",
-                      why, steps_to_settle(scene, *filling)),
+                 text("the stress \"at rest\" is no closed form: {}; the soil settles under damping before t = 0, about {:.0f} steps", why,
+                      steps_to_settle(scene, *filling)),
                  true});
         if (!scene.start.from.empty()) scene.notes.push_back({"start", "from the last state of " + scene.start.from, true});
         const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
@@ -692,7 +685,7 @@ std::optional<Ready> ready(Scene scene, StepLimit limit, Issues& issues)
     }
     issues = rules.issues;
     if (!filling) return {};
-    return Ready{std::move(scene), std::move(rules.issues), std::move(*filling)};
+    return CheckedScene{std::move(scene), std::move(rules.issues), std::move(*filling)};
 }
 
 double excess_of_mass(const Scene& scene, const Filling& filling, int body)

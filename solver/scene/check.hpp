@@ -1,6 +1,5 @@
 #pragma once
-// The rules a scene must obey beyond the type and range of each key, and the choice of effects it leaves to
-// us.
+// The rules a scene must obey beyond the type and range of each key, and the choice of effects it leaves to us.
 #include "solver/scene/fill.hpp"
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
@@ -19,27 +18,26 @@ double crossing_time(const Scene&);
 /// Fixed steps (s) up to here are stable with margin, and up to there stable at all.
 double recommended_step(const Scene&);
 double stable_step(const Scene&);
-/// Every so many steps soil that may sleep (accuracy.sleep_below) is looked at: no sooner can a P-wave that was nowhere near a sleeper,
-/// not within its support, have reached it.
+/// Every so many steps soil that may sleep (accuracy.sleep_below) is checked for calm: no sooner can a P-wave that was outside the support
+/// of a sleeping particle have reached it.
 std::int64_t sleep_interval(const Scene&);
 
 /// What a step above the stable limit is: an error, or a warning for --force-step.
 enum class StepLimit { Enforce, Force };
 
-/// Decides what the file leaves to "auto" and rewrites scene.notes: one line for every effect, on or off, and
-/// why.
+/// Decides what the file leaves to "auto" and rewrites scene.notes: one line for every effect, on or off, and why.
 void resolve(Scene&);
 /// Every rule a resolved scene breaks: errors and warnings, filling included.
 Issues check(const Scene&, StepLimit = StepLimit::Enforce);
 
-/// A resolved scene without errors, what is doubtful about it, and the particles it starts with: made once, by its check.
-struct Ready {
+/// A resolved scene without errors, its warnings, and the particles it starts with: made once, by its check.
+struct CheckedScene {
     Scene scene;
     Issues warnings;
     Filling filling;
 };
 /// Nothing where check() finds errors; all that it finds is in `issues`.
-std::optional<Ready> ready(Scene, StepLimit, Issues& issues);
+std::optional<CheckedScene> check_and_fill(Scene, StepLimit, Issues& issues);
 
 /// By how much of it (1) the mass of a body's particles exceeds that of its shape's volume; above `most_excess` either way a warning.
 double excess_of_mass(const Scene&, const Filling&, int body);

@@ -11,13 +11,13 @@ const double tolerance = 1e-6;
 /// A lattice point this close to a face, in spacings, lies on it; where coordinates are so large that rounding moves them by more,
 /// one within that.
 const double on_the_face = 1e-9;
-/// Where rounding moves coordinates by more than this share of a spacing, nobody can say what belongs where.
+/// Where rounding moves coordinates by more than this share of a spacing, it is undefined which shape holds a point.
 const double most_rounding = 0.01;
 /// More points, or more rows to be stored, than this mean a spacing that is not meant. The rows of all shapes count together: each
 /// takes 40 bytes, and 0.1 microseconds to be found.
 const double most_points = 1e11, most_rows = 2e7;
 /// Points next to a polygon's edges are looked at one by one, each against all corners: more of that than this takes too long.
-const double most_looks = 1e9;
+const double most_edge_tests = 1e9;
 
 double at(const Vector& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -73,7 +73,7 @@ std::optional<Passage> passage(const Shape& shape, double y, double z, int dimen
 
 /// At most so many distances from a point to a polygon's edge are taken to fill it: for each row that an edge passes a few points
 /// at the passage, more where it runs along the row, each against every edge.
-double looks(const Polygon& polygon, double spacing)
+double edge_tests(const Polygon& polygon, double spacing)
 {
     const std::size_t n = polygon.points.size();
     double points = 0;
@@ -151,9 +151,8 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
         if (!(high > low)) return fmt::format("expected low < high along {}, found {} and {}", name, low, high);
         if (std::holds_alternative<Box>(shape) && std::abs(n - std::round(n)) * spacing > slack(shape, spacing, dimensions)) {
             const double less = low + std::floor(n) * spacing, more = low + std::ceil(n) * spacing;
-            return fmt::format("expected a whole number of spacings ({} m) a side, found {:.9g} along {}; "
-                               "let high.{} be {}{:.9g}",
-                               spacing, n, name, name, n > 1 ? fmt::format("{:.9g} or ", less) : "", more);
+            return fmt::format("expected a whole number of spacings ({} m) a side, found {:.9g} along {}; let high.{} be {}{:.9g}", spacing,
+                               n, name, name, n > 1 ? fmt::format("{:.9g} or ", less) : "", more);
         }
         points *= n;
     }
@@ -166,10 +165,10 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
         return fmt::format("expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
                            "is space.spacing in metres?",
                            points, spacing);
-    if (const auto* p = std::get_if<Polygon>(&shape); p && looks(*p, spacing) > most_looks)
+    if (const auto* p = std::get_if<Polygon>(&shape); p && edge_tests(*p, spacing) > most_edge_tests)
         return fmt::format("expected a polygon that can be filled in a minute, found {} corners and {:.3g} particles next to its edges at "
                            "a spacing of {} m; leave out corners, or is space.spacing in metres?",
-                           p->points.size(), looks(*p, spacing) / double(p->points.size()), spacing);
+                           p->points.size(), edge_tests(*p, spacing) / double(p->points.size()), spacing);
     return {};
 }
 
@@ -228,8 +227,7 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions, Vector leas
             while (axis.range.first <= axis.range.last && !any(axis.range.first)) ++axis.range.first;
             while (axis.range.first <= axis.range.last && !any(axis.range.last)) --axis.range.last;
         };
-        // Along the axis of extrusion the first and last layers may lie outside: cut them off, then rows
-        // repeat.
+        // Along the axis of extrusion the first and last layers may lie outside: cut them off, then rows repeat.
         if (const auto* c = std::get_if<Cylinder>(&shape)) {
             trim(z_, [&](auto k) { return between(coordinate(z_, k), c->base.z, c->base.z + c->height, on_face_); });
             stride_y_ = 1;
@@ -307,29 +305,29 @@ Lattice::Range Lattice::within(const Axis& a, double low, double high) const
 Vector Lattice::position(std::int64_t local) const
 {
     ensure(local >= 0 && local < size_, "a lattice point is asked for that does not exist");
-    std::int64_t iz, rest, iy = 0;
+    std::int64_t iz, index, iy = 0;
     if (stride_z_) {
         iz = std::upper_bound(layer_id_.begin(), layer_id_.end(), local) - layer_id_.begin() - 1;
-        rest = local - layer_id_[std::size_t(iz)];
+        index = local - layer_id_[std::size_t(iz)];
     } else {
         iz = local / layer_id_[1];
-        rest = local % layer_id_[1];
+        index = local % layer_id_[1];
     }
     const std::int64_t kz = z_.range.first + iz;
     if (stride_y_) {
         const auto begin = row_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0), end = begin + count(y_.range);
-        iy = std::upper_bound(begin, end, rest) - begin - 1;
-        rest -= begin[iy];
+        iy = std::upper_bound(begin, end, index) - begin - 1;
+        index -= begin[iy];
     } else {
         const std::int64_t n = row(kz, y_.range.first).size;
-        iy = rest / n;
-        rest %= n;
+        iy = index / n;
+        index %= n;
     }
     const std::int64_t ky = y_.range.first + iy;
     const auto in = row(kz, ky).intervals;
     auto here = in.begin();
-    while (rest > here->before + here->last - here->first) ++here;
-    return {coordinate(x_, here->first + rest - here->before), y_of(ky), coordinate(z_, kz)};
+    while (index > here->before + here->last - here->first) ++here;
+    return {coordinate(x_, here->first + index - here->before), y_of(ky), coordinate(z_, kz)};
 }
 
 std::int64_t Lattice::count_in(const Box& region) const
@@ -396,18 +394,18 @@ Filling::Survey Filling::survey(const Scene& scene)
 
     Issues issues;
     const int dimensions = scene.dimensions;
-    double rows = 0, looks = 0;
+    double rows = 0, edge_tests = 0;
     for (auto& p : pieces) {
         p.problem = Lattice::problem(*p.shape, scene.space.spacing, dimensions);
         if (!p.problem.empty()) continue;
         rows += Lattice::rows(*p.shape, scene.space.spacing, dimensions);
-        if (const auto* polygon = std::get_if<Polygon>(p.shape)) looks += scene::looks(*polygon, scene.space.spacing);
-        if (rows <= most_rows && looks <= most_looks) continue;
+        if (const auto* polygon = std::get_if<Polygon>(p.shape)) edge_tests += scene::edge_tests(*polygon, scene.space.spacing);
+        if (rows <= most_rows && edge_tests <= most_edge_tests) continue;
         issues.push_back({Severity::Error,
                           p.key,
                           fmt::format("expected shapes that a computer can hold together, found {:.3g} rows of particles up to this one at "
                                       "a spacing of {} m{}; is space.spacing in metres?",
-                                      rows, scene.space.spacing, looks > most_looks ? ", with too many corners" : ""),
+                                      rows, scene.space.spacing, edge_tests > most_edge_tests ? ", with too many corners" : ""),
                           {}});
         return {std::move(issues), {}};
     }
@@ -434,7 +432,7 @@ Filling::Survey Filling::survey(const Scene& scene)
                                           scene.space.spacing),
                               {}});
     }
-    // One mistake may make every shape overlap every other: nobody reads a million lines, nor waits for them.
+    // One mistake may make every shape overlap every other: a million lines are of no use.
     const std::size_t enough = 100;
     std::vector<Box> boxes;
     for (const auto& p : pieces) boxes.push_back(scene::bounds(*p.shape));

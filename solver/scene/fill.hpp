@@ -1,7 +1,6 @@
 #pragma once
 // The particles a scene starts with, computed and never stored: the lattice points of bodies and walls, by id
-// or by region. Every rank and every region gets the same bits, because one function computes every
-// coordinate.
+// or by region. Every rank and every region gets the same bits, because one function computes every coordinate.
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/scene/shape.hpp"
@@ -50,8 +49,7 @@ public:
     const Box& bounds() const { return bounds_; }
     /// Points in a closed region; in 2-D its y does not count.
     std::int64_t count_in(const Box& region) const;
-    /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does
-    /// not count.
+    /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does not count.
     template <class Visit> void for_each_in(const Box& region, Visit visit) const;
     /// Points one above the other without a gap, as a column one spacing wide.
     struct Stack {
@@ -142,8 +140,7 @@ public:
     const Box& soil_bounds() const { return soil_bounds_; }
     const Box& bounds() const { return bounds_; }
 
-    /// Calls visit(std::int64_t id, Vector x, int body) for the soil particles in a closed region, by rising
-    /// id.
+    /// Calls visit(std::int64_t id, Vector x, int body) for the soil particles in a closed region, by rising id.
     template <class Visit> void for_each_soil_in(const Box& region, Visit visit) const
     {
         for (std::size_t b = 0; b < n_bodies_; ++b)
@@ -160,8 +157,7 @@ public:
         for (std::size_t b = 0; b < n_bodies_; ++b)
             lattices_[b].for_each_stack_in(region, [&](const Lattice::Stack& s) { visit(s, int(b)); });
     }
-    /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising
-    /// id.
+    /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising id.
     template <class Visit> void for_each_wall_in(const Box& region, Visit visit) const
     {
         for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)

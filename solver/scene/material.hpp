@@ -11,13 +11,13 @@ namespace kuzure {
 struct Material {
     double density;     // kg/m^3
     double bulk, shear; // K, G in Pa
-    double sound_speed; // c_p = sqrt((K + 4 G/3)/rho), m/s
+    double c_p;         // P-wave: sqrt((K + 4 G/3)/rho), m/s
     double alpha, k;    // 1, Pa
     double alpha_psi;   // 1, slope of the plastic potential sqrt(J2) + alpha_psi I1
     double apex;        // Pa, largest trace I1: k/alpha or 3 p_t of the cut-off; infinite without friction and cut-off
     double cutoff;      // Pa, 3 p_t; infinite without
-    double rod_speed;   // sqrt(E/rho), m/s
-    double at_rest;     // sideways_at_rest() of ground so deep that cohesion does not count
+    double c_bar;       // wave in a bar: sqrt(E/rho), m/s
+    double K0;          // sideways_at_rest() of ground so deep that cohesion does not count
     double remembers;   // 1: volume opened at the apex bears no pressure until it is closed; 0: at once
     // What changes the cone during a run; where it does not, the residual values are the first ones.
     double residual_alpha, residual_k;
@@ -88,7 +88,7 @@ struct Material {
         m.density = soil.density;
         m.bulk = soil.young / (3 * (1 - 2 * soil.poisson));
         m.shear = soil.young / (2 * (1 + soil.poisson));
-        m.sound_speed = std::sqrt((m.bulk + 4 * m.shear / 3) / m.density);
+        m.c_p = std::sqrt((m.bulk + 4 * m.shear / 3) / m.density);
         m.alpha = slope(soil.cone, soil.friction_angle);
         m.k = strength(soil.cone, soil.friction_angle, soil.cohesion);
         m.alpha_psi = slope(soil.cone, soil.dilation_angle);
@@ -96,8 +96,8 @@ struct Material {
         m.apex = m.alpha > 0 ? m.k / m.alpha : std::numeric_limits<double>::infinity();
         m.cutoff = soil.tension_cutoff ? 3 * *soil.tension_cutoff : std::numeric_limits<double>::infinity();
         m.apex = std::min(m.apex, m.cutoff);
-        m.rod_speed = std::sqrt(soil.young / m.density);
-        m.at_rest = m.sideways_at_rest(std::numeric_limits<double>::infinity());
+        m.c_bar = std::sqrt(soil.young / m.density);
+        m.K0 = m.sideways_at_rest(std::numeric_limits<double>::infinity());
         m.residual_alpha = m.alpha, m.residual_k = m.k, m.fast_alpha = m.alpha;
         if (const auto& s = soil.softening) {
             m.residual_alpha = slope(soil.cone, s->friction_angle);
@@ -112,8 +112,7 @@ struct Material {
         return m;
     }
     /// Largest alpha for which a soil without cohesion bears no tensile principal stress: 1/(2 sqrt 3),
-    /// reached by the stress (0, -p, -p), which is the first with a zero principal stress to enter a widening
-    /// cone.
+    /// reached by the stress (0, -p, -p), which is the first with a zero principal stress to enter a widening cone.
     static double widest_cone_without_tension() { return 0.5 / std::sqrt(3.0); }
 };
 

@@ -5,11 +5,11 @@
 
 namespace kuzure::scene {
 
-std::vector<Judgement> judge(const Scene& s, const Filling& f)
+std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
 {
-    std::vector<Judgement> all;
-    const auto add = [&](const char* name, double value, std::string about, bool doubtful, std::string doubt) {
-        all.push_back({name, value, std::move(about), doubtful ? std::move(doubt) : std::string()});
+    std::vector<Indicator> all;
+    const auto add = [&](const char* name, double value, std::string about, bool doubtful, std::string warning) {
+        all.push_back({name, value, std::move(about), doubtful ? std::move(warning) : std::string()});
     };
     const Box b = f.soil_bounds();
     const double dx = s.space.spacing, height = b.high.z - b.low.z + dx, width = b.high.x - b.low.x + dx;
@@ -18,8 +18,8 @@ std::vector<Judgement> judge(const Scene& s, const Filling& f)
     bool rate = true;
     for (const auto& soil : s.soils) {
         const Material m = Material::from(soil);
-        softest = std::min(softest, m.sound_speed * m.sound_speed); // M/rho
-        slowest = std::min(slowest, m.sound_speed);
+        softest = std::min(softest, m.c_p * m.c_p); // M/rho
+        slowest = std::min(slowest, m.c_p);
         cohesion = std::max(cohesion, soil.cohesion);
         rate = rate && soil.rate_friction.has_value();
     }
@@ -69,7 +69,7 @@ std::vector<SoilNumbers> soil_numbers(const Scene& s, const Filling& f)
         const Material m = Material::from(soil);
         const double weight = soil.density * g;
         all.push_back({soil.name, weight, m.sideways_at_rest(weight > 0 ? 0.5 * weight * height : std::numeric_limits<double>::infinity()),
-                       weight > 0 ? soil.cohesion / (weight * height) : 0, m.sound_speed, std::sqrt(m.shear / soil.density)});
+                       weight > 0 ? soil.cohesion / (weight * height) : 0, m.c_p, std::sqrt(m.shear / soil.density)});
     }
     return all;
 }

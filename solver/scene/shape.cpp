@@ -87,8 +87,7 @@ Contact contact_in_plane(const Polygon& polygon, Point x)
         const Point out = outward(edge);
         return {dot(x - corner(polygon, edge), out), {out.x, 0, out.z}};
     }
-    // A corner is closest: the normal points from it to the point outside or, on the corner, between its
-    // edges.
+    // A corner is closest: the normal points from it to the point outside or, on the corner, between its edges.
     const std::size_t k = where <= 0 ? edge : edge + 1 < n ? edge + 1 : 0;
     const Point d = x - corner(polygon, k);
     const double l = std::hypot(d.x, d.z);

@@ -36,7 +36,7 @@ struct Mirrored {
     }
 };
 
-/// Contact: how one particle feels one wall, the surface's distance and normal, and what its velocity and stress look like there.
+/// Contact: how one particle meets one wall, the surface's distance and normal, and what its velocity and stress look like there.
 struct WallContact {
     double distance;
     Vector normal, mirrored; // m, 1, m/s: the velocity that the wall mirrors,

@@ -22,7 +22,7 @@ extern "C" std::uint32_t H5_checksum_metadata(const void*, std::size_t, std::uin
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 
 [[noreturn]] void found(const char* what)
 {

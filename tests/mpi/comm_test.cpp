@@ -84,7 +84,7 @@ TEST(Comm, ExchangeDeliversEveryMessageOnce)
 TEST(Comm, ExchangeKeepsTheOrderOfOneSender)
 {
     const int next = (world().rank() + 1) % world().size();
-    std::vector<Parcel<int>> out;
+    std::vector<MessageOf<int>> out;
     for (int k = 0; k < 5; ++k) out.push_back({next, std::vector<int>(std::size_t(k), k)});
     const auto in = world().exchange(out);
     ASSERT_EQ(in.size(), 5u);
@@ -101,7 +101,7 @@ TEST(Comm, ExchangeRefusesARankThatDoesNotExist)
 
 TEST(Comm, NodesCountTheirRanks)
 {
-    const NodePlace p = world().node_place();
+    const NodePosition p = world().node_position();
     EXPECT_GE(p.rank, 0);
     EXPECT_LT(p.rank, p.size);
     EXPECT_GE(p.node, 0);

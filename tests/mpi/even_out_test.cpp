@@ -82,7 +82,7 @@ TEST(EvenOut, FollowsAMovingLoadOnImaginedRanks)
             std::vector<std::set<int>> touched(static_cast<std::size_t>(ranks));
             for (int b = 0; b < g.size(); ++b)
                 for (const auto& l : g.links(b)) touched[owner[b]].insert(owner[l.block]);
-            const auto r = even_out(ImaginedCrew(ranks), by_owner(blocks, owner, ranks), grid, known);
+            const auto r = even_out(VirtualRanks(ranks), by_owner(blocks, owner, ranks), grid, known);
             const auto now = owners_of(g, known);
             const auto after = describe(g, now, ranks);
             const auto what = [&] { return std::to_string(ranks) + " ranks, step " + std::to_string(step); };
@@ -118,9 +118,9 @@ TEST(EvenOut, LeavesAnEvenCutAlone)
     const auto owner = partition(g, 7);
     ASSERT_LE(describe(g, owner, 7).imbalance, good_balance);
     std::vector<BlockOwners> known(7, BlockOwners(g.block, owner));
-    const auto r = even_out(ImaginedCrew(7), by_owner(blocks, owner, 7), {}, known);
+    const auto r = even_out(VirtualRanks(7), by_owner(blocks, owner, 7), {}, known);
     EXPECT_EQ(r.moved, 0);
-    EXPECT_EQ(r.sweeps, 0);
+    EXPECT_EQ(r.iterations, 0);
     EXPECT_EQ(owners_of(g, known), owner);
 }
 
@@ -138,7 +138,7 @@ TEST(EvenOut, BodiesApartAndRanksWithoutBlocks)
     std::vector<BlockOwners> known(5, BlockOwners(g.block, owner));
     // A cut takes one layer off a part; here three or four must go.
     EvenReport r;
-    for (int cut = 0; cut < 5; ++cut) r = even_out(ImaginedCrew(5), by_owner(blocks, owners_of(g, known), 5), {}, known);
+    for (int cut = 0; cut < 5; ++cut) r = even_out(VirtualRanks(5), by_owner(blocks, owners_of(g, known), 5), {}, known);
     const auto w = describe(g, owners_of(g, known), 5).work;
     EXPECT_NEAR(w[0], 40, 1.01);
     EXPECT_NEAR(w[2], 80, 2.01);
@@ -153,7 +153,7 @@ TEST(EvenOut, SettlesWhoOwnsABlockThatTwoRanksFound)
     std::vector<BlockOwners> known{{{{0, 0, 0}, {1, 0, 0}}, {0, 0}}, {{{3, 0, 0}, {4, 0, 0}}, {1, 1}}};
     const std::vector<std::vector<BlockWork>> listed{{{{0, 0, 0}, 10, 10}, {{1, 0, 0}, 10, 10}, {{2, 0, 0}, 0.1, 1}},
                                                      {{{2, 0, 0}, 0.2, 1}, {{3, 0, 0}, 10, 10}, {{4, 0, 0}, 10, 10}}};
-    const auto r = even_out(ImaginedCrew(2), listed, {}, known);
+    const auto r = even_out(VirtualRanks(2), listed, {}, known);
     EXPECT_EQ(r.blocks, 5);
     EXPECT_NEAR(r.mean, 20.15, 1e-12);
     for (const auto& k : known) EXPECT_EQ(k.owner_of({2, 0, 0}, {0, 0, 0}), 1);
@@ -163,7 +163,7 @@ TEST(EvenOut, RefusesNonsense)
 {
     if (world().rank() != 0) return;
     std::vector<BlockOwners> known(2);
-    EXPECT_THROW(even_out(ImaginedCrew(2), {{{{0, 0, 0}, NAN, 1}}, {}}, {}, known), Broken);
+    EXPECT_THROW(even_out(VirtualRanks(2), {{{{0, 0, 0}, NAN, 1}}, {}}, {}, known), Broken);
 }
 
 TEST(BlockOwners, ForgetsOnlyWhatIsFar)
@@ -173,7 +173,7 @@ TEST(BlockOwners, ForgetsOnlyWhatIsFar)
     std::vector<int> owner;
     for (int i = 0; i < 12; ++i) blocks.push_back({i, 0, 0}), owner.push_back(i / 3);
     BlockOwners o(blocks, owner);
-    o.forget_far(0, {12, 0, 0});
+    o.keep_neighbourhood(0, {12, 0, 0});
     std::vector<Block> left{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}, {10, 0, 0}, {11, 0, 0}};
     EXPECT_EQ(std::vector(o.blocks().begin(), o.blocks().end()), left);
     EXPECT_EQ(o.owner_of({10, 0, 0}, {12, 0, 0}), 3);
@@ -202,7 +202,7 @@ TEST(Domain, EvensOutAMovingLoadAndMigratesToNeighbours)
         p[field::position].set(Index(k), Vector{b[0] + 0.5, b[1] + 0.5, b[2] + 0.5});
         p[field::id].set(Index(k), (b[0] * 8 + b[1]) * 4 + b[2]);
     }
-    domain.forget_far();
+    domain.keep_neighbourhood();
     double before = 1;
     for (int step = 1; step <= 10; ++step) {
         mine.clear();

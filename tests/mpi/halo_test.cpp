@@ -56,7 +56,7 @@ struct Particle {
 };
 
 /// Particles by id over all ranks, the same on every rank.
-std::vector<Particle> everybody(const Particles& p)
+std::vector<Particle> all_particles(const Particles& p)
 {
     std::vector<Particle> mine;
     for (Index i = 0; i < p.size(); ++i) mine.push_back({p[field::id][i], p[field::position][i]});
@@ -97,7 +97,7 @@ std::vector<BlockWork> blocks_of(const Domain& d, const Particles& p)
 
 void expect_nobody_lost(const Particles& p, int n)
 {
-    const auto all = everybody(p);
+    const auto all = all_particles(p);
     ASSERT_EQ(int(all.size()), n);
     for (int k = 0; k < n; ++k) ASSERT_EQ(all[k].id, k);
     for (Index i = 0; i < p.size(); ++i) {
@@ -109,7 +109,7 @@ void expect_nobody_lost(const Particles& p, int n)
     }
 }
 
-/// Drift everybody by up to d; whoever leaves a period comes in at its other end.
+/// Moves every particle by up to d; one that leaves a period comes in at its other end.
 void drift(const Cloud& c, Particles& p, double d, unsigned seed)
 {
     auto x = p[field::position];
@@ -138,7 +138,7 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
 {
     const HaloPlan plan = domain.plan_halo(p, c.reach);
     Halo halo(world(), plan, sizeof(Row));
-    const auto all = everybody(p);
+    const auto all = all_particles(p);
     std::vector<char> own(all.size(), 0);
     for (Index i = 0; i < p.size(); ++i) own[p[field::id][i]] = 1;
 
@@ -235,8 +235,7 @@ TEST_P(Clouds, MigrateAndSeeEveryPair)
     on_their_owners();
     expect_complete_halo(c, domain, p);
 
-    // Particles enter blocks that were empty when the cut was made; first seen by whoever has them, then by
-    // owners.
+    // Particles enter blocks that were empty when the cut was made; first seen by whoever has them, then by owners.
     drift(c, p, std::min(1.5 * c.reach, 0.25), 1);
     expect_complete_halo(c, domain, p);
     domain.migrate(p);

@@ -88,7 +88,7 @@ TEST_F(IoTest, ACheckpointOfManyRanksIsReadByAnyNumber)
         EXPECT_TRUE(same_bits(q, share(world().sum_below(q.size()), q.size())));
 
         Particles all; // by each rank alone
-        io::read_checkpoint(Alone{}, file, all);
+        io::read_checkpoint(SingleRank{}, file, all);
         EXPECT_TRUE(same_bits(all, share(0, total)));
         world().barrier();
     }
@@ -96,7 +96,7 @@ TEST_F(IoTest, ACheckpointOfManyRanksIsReadByAnyNumber)
 
 TEST_F(IoTest, OneRanksCheckpointIsReadByMany)
 {
-    if (world().rank() == 0) io::write_checkpoint(Alone{}, dir, share(0, 5000), "hash", "header");
+    if (world().rank() == 0) io::write_checkpoint(SingleRank{}, dir, share(0, 5000), "hash", "header");
     world().barrier();
     Particles q;
     EXPECT_EQ(io::read_checkpoint(world(), dir / "checkpoint.h5", q).particles, 5000);
@@ -252,7 +252,7 @@ TEST_F(IoTest, ThePicturesAreTheSameForAnyNumberOfRanks)
         for (int k = 0; k < 3; ++k) {
             task.at = 0.1 * k;
             task.file = [&](int) { return dir / "alone.png"; };
-            io::draw_pictures(Alone{}, task);
+            io::draw_pictures(SingleRank{}, task);
             EXPECT_EQ(io::read_text(dir / "alone.png"), io::read_text(io::picture_file(dir, k)));
         }
     task.color = "sped"; // all ranks hear of it

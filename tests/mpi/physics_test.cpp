@@ -94,7 +94,7 @@ TEST(Column, SwingsWithThePeriodOfItsPWave)
     t.walls = box("wall", "0, 0, -0.16", "0.24, 0.24, 0", "");
     t.effects += "\nartificial_stress = \"auto\"";
     Simulation sim(world(), t.scene());
-    const double period = 4 * 1.2 / sim.soils()[0].sound_speed;
+    const double period = 4 * 1.2 / sim.soils()[0].c_p;
     double before = -1, last = 0, half = 0;
     while (!sim.finished()) {
         sim.step();

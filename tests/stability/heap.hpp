@@ -4,17 +4,17 @@
 
 namespace kuzure::validation {
 
-struct Rest {
+struct HeapResult {
     double drift = 0, kinetic = 0, early = 0,
            late = 0; // D in dx; greatest KE/PE_0 of the last quarter; creep of the first and last quarter, dx
     double calm = 0; // KE/PE_0 at the end
     int moved = 0;   // particles with a drift above 0.1 dx
 };
 /// Watches what stands still from `settled` s to the scene's end; kinetic energies over `potential` J.
-inline Rest watch(Simulation& sim, double settled, double potential)
+inline HeapResult watch(Simulation& sim, double settled, double potential)
 {
     const double spacing = sim.scene().space.spacing, span = sim.scene().time.end - settled;
-    const auto apart = [&](const Places& from) {
+    const auto apart = [&](const Positions& from) {
         double most = 0;
         each_way(sim, from, [&](double way) { most = std::max(most, way); });
         return most / spacing;
@@ -24,13 +24,13 @@ inline Rest watch(Simulation& sim, double settled, double potential)
         each(sim, [&](Index i) { sum += 0.5 * particle_mass(sim, i) * dot(velocity(sim, i), velocity(sim, i)); });
         return sum / potential;
     };
-    Rest r;
+    HeapResult r;
     run_to(sim, settled);
-    const auto start = places(sim);
+    const auto start = positions(sim);
     run_to(sim, settled + 0.25 * span);
     r.early = apart(start);
     run_to(sim, settled + 0.75 * span);
-    const auto third = places(sim);
+    const auto third = positions(sim);
     while (!sim.finished()) {
         sim.step();
         if (sim.steps() % 20 == 0) r.kinetic = std::max(r.kinetic, kinetic());
@@ -47,7 +47,7 @@ inline double potential_energy(const Simulation& sim)
     return sum;
 }
 /// A heap with a factor of safety `fos`, settled with damping for 10 sqrt(H/g), then watched for `times` sqrt(H/g).
-inline Rest heap(double spacing, double fos, double times, const std::string& kernel, double h, const std::string& more = mild)
+inline HeapResult heap(double spacing, double fos, double times, const std::string& kernel, double h, const std::string& more = mild)
 {
     SceneText t;
     t.spacing = spacing, t.h = h, t.accuracy = "kernel = \"" + kernel + "\"";

@@ -64,7 +64,7 @@ TEST(AddingATerm, ItsForceIsAddedToTheOthers)
             const double distance = length(r);
             if (i == j || distance >= 2 * W.h) continue;
             const double volume = c.scene.particle_volume() * c.soils[0].density / q[field::density][j];
-            sum = sum + (volume * W.scale * W.shape(2 * W.h - distance, distance, 1 / distance)) * r;
+            sum = sum + (volume * W.scale * W.F(2 * W.h - distance, distance, 1 / distance)) * r;
         }
         const Vector expected = (p / q[field::density][i]) * sum, found = with.a[std::size_t(i)] - without.a[std::size_t(i)];
         worst = std::max(worst, length(found - expected)), largest = std::max(largest, length(expected));

@@ -30,12 +30,12 @@ TEST(Alone, EveryCollectiveCallIsItsOwnAnswer)
     const std::vector<int> mine{1, 2, 3};
     EXPECT_EQ(comm.allgather(std::span<const int>(mine)), mine);
     EXPECT_TRUE(comm.allgather(std::span<const int>()).empty());
-    const auto in = comm.exchange(std::vector<Parcel<int>>{{0, {1, 2}}, {0, {3}}});
+    const auto in = comm.exchange(std::vector<MessageOf<int>>{{0, {1, 2}}, {0, {3}}});
     ASSERT_EQ(in.size(), 2u);
     EXPECT_EQ(in[0].items, (std::vector<int>{1, 2}));
     EXPECT_EQ(in[1].items, std::vector<int>{3});
-    EXPECT_TRUE(comm.tell({}, 1.0).empty());
-    const auto place = comm.node_place();
+    EXPECT_TRUE(comm.exchange_scalar({}, 1.0).empty());
+    const auto place = comm.node_position();
     EXPECT_EQ(place.size, 1);
     EXPECT_EQ(place.nodes, 1);
     EXPECT_FALSE(Comm::library().empty()); // asked without MPI

@@ -284,7 +284,7 @@ TEST(AtRest, CheckSaysWhereItSettlesAndWhatThatTakes)
 {
     const auto note = [](const Scene& s) {
         Issues issues;
-        const auto made = ready(s, StepLimit::Enforce, issues);
+        const auto made = check_and_fill(s, StepLimit::Enforce, issues);
         for (const auto& n : made.value().scene.notes)
             if (n.name == "settling") return n.why;
         return std::string();

@@ -215,7 +215,7 @@ book::Shown mirrored_at_each_point(const book::Particle& i, const book::WallPoin
 {
     const double above = dot(i.x - j.x, j.normal) - j.depth;
     const double factor = above > 0 ? std::clamp(1 + j.depth / above, 1.0, 1.5) : 1.5;
-    return {{j.x, (1 - factor) * i.v, i.density, i.stress, volume, i.sound_speed}, j.normal};
+    return {{j.x, (1 - factor) * i.v, i.density, i.stress, volume, i.c_p}, j.normal};
 }
 Difference off_from(const Cloud& c, const Read& read)
 {

@@ -14,7 +14,7 @@ using testing::HasSubstr;
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 
 class CheckpointTest : public testing::Test {
 protected:

@@ -31,7 +31,7 @@ template <class V> struct Point {
         const Sym3<V> before = sigma;
         const auto y = return_to_cone(sigma + hooke(d, soil), soil);
         sigma = y.sigma;
-        plastic_work += lane(y.work, 0), gamma += lane(y.shear_strain, 0);
+        plastic_work += lane(y.plastic_work, 0), gamma += lane(y.d_lambda, 0);
         work += 0.5 * lane(contract(before + sigma, d), 0);
     }
     Stress at() const

@@ -38,8 +38,8 @@ template <class V> struct SimpleShear {
         const auto y = return_to_cone(trial, now);
         const double volume = lane(trace(trial) - trace(y.sigma), 0) / (3 * lane(soil.bulk, 0));
         sigma = y.sigma;
-        plastic_strain += lane(y.shear_strain, 0);
-        work += lane(y.work, 0);
+        plastic_strain += lane(y.d_lambda, 0);
+        work += lane(y.plastic_work, 0);
         return volume;
     }
     double tau() const { return lane(sigma.xz, 0); }

@@ -89,8 +89,7 @@ TEST_P(Fill, HoldsExactlyTheLatticePointsInside)
             for (int ky = dimensions == 2 ? 0 : -20; ky < (dimensions == 2 ? 1 : 60); ++ky)
                 for (int kx = -20; kx < 60; ++kx) {
                     const Vector x{o.x + (kx + 0.5) * dx, dimensions == 2 ? 0.0 : o.y + (ky + 0.5) * dx, o.z + (kz + 0.5) * dx};
-                    // A face belongs to the side of greater coordinates: inside is what is inside a little further along x, then y,
-                    // then z.
+                    // A face belongs to the side of greater coordinates: inside is what is inside a little further along x, then y, then z.
                     if (signed_distance(shape, x + Vector{1e-6, 1e-8, 1e-10}, dimensions) >= 0) continue;
                     ASSERT_LT(at, all.size());
                     ASSERT_EQ(all[at++], (Particle{expected_id++, x, int(b)}));

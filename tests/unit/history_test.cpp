@@ -14,7 +14,7 @@ using testing::StartsWith;
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 
 class HistoryTest : public testing::Test {
 protected:

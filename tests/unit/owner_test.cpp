@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 const auto quiet = [](const std::string&) {};
 
 class OwnerTest : public testing::Test {

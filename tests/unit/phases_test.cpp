@@ -137,7 +137,7 @@ TEST(PhaseReport, OverTheRanks)
 
 TEST(PhaseReport, JsonHoldsWhatTheTableHolds)
 {
-    auto report = phase_report(a_run(), {.steps = 4, .particle_steps = 400, .pairs = 8000}, 2, Alone());
+    auto report = phase_report(a_run(), {.steps = 4, .particle_steps = 400, .pairs = 8000}, 2, SingleRank());
     const auto j = nlohmann::json::parse(report.json());
     EXPECT_EQ(j["ranks"], 1);
     EXPECT_EQ(j["pairs"], 8000);
@@ -153,7 +153,7 @@ TEST(PhaseReport, JsonHoldsWhatTheTableHolds)
 
 TEST(PhaseReport, TableIsAligned)
 {
-    auto report = phase_report(a_run(), {.steps = 4, .particle_steps = 400, .pairs = 8000}, 2, Alone());
+    auto report = phase_report(a_run(), {.steps = 4, .particle_steps = 400, .pairs = 8000}, 2, SingleRank());
     report.machine = Machine{.host = "h", .cpu = "a processor", .instruction_set = "avx2", .threads = 2};
     const std::string text = report.text();
     EXPECT_THAT(text, testing::HasSubstr("1 rank of 2 threads, 4 steps"));
@@ -167,7 +167,7 @@ TEST(PhaseReport, TableIsAligned)
 
 TEST(PhaseReport, AnEmptyRunDividesByNothing)
 {
-    const auto report = phase_report(Timers(), {}, 1, Alone());
+    const auto report = phase_report(Timers(), {}, 1, SingleRank());
     EXPECT_EQ(report.total.share, 0);
     EXPECT_EQ(report.pair_loop.gflops(), 0);
     EXPECT_THAT(report.text() + report.json(), testing::Not(testing::ContainsRegex("nan|inf|null")));

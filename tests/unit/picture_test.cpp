@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 
 struct Image {
     int width = 0, height = 0;

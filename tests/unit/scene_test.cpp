@@ -53,7 +53,7 @@ TEST(Material, ElasticNumbersOfTheSeed)
     const auto m = Material::from(column().soils[0]);
     EXPECT_DOUBLE_EQ(m.bulk, 1.5e6);
     EXPECT_NEAR(m.shear, 692307.69, 0.01);
-    EXPECT_NEAR(m.sound_speed, 36.19, 0.005);
+    EXPECT_NEAR(m.c_p, 36.19, 0.005);
     EXPECT_EQ(m.k, 0);
     EXPECT_EQ(m.apex, 0);
     EXPECT_EQ(m.alpha_psi, 0);

@@ -90,8 +90,7 @@ TEST(Shape, FollowingTheNormalLeadsToTheSurface)
 
 TEST(Shape, NoPointOfTheSurfaceIsNearer)
 {
-    // Walking from x by less than the distance never crosses the surface; by a little more it does in some
-    // direction.
+    // Walking from x by less than the distance never crosses the surface; by a little more it does in some direction.
     std::mt19937 random(3);
     std::normal_distribution<double> g;
     for (const auto& shape : shapes)

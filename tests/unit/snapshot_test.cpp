@@ -13,7 +13,7 @@ using testing::HasSubstr;
 
 namespace {
 
-const Alone alone;
+const SingleRank alone;
 
 class SnapshotTest : public testing::Test {
 protected:

@@ -88,7 +88,7 @@ Steps steps(const Cloud& c)
     double fastest = 0;
     for (Index i = 0; i < c.particles.size(); ++i) fastest = std::max(fastest, length(std::as_const(c.particles)[field::velocity][i]));
     double sound = 0;
-    for (const auto& m : c.soils) sound = std::max(sound, m.sound_speed);
+    for (const auto& m : c.soils) sound = std::max(sound, m.c_p);
     const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest, 2 / sound);
     return {dt, 0.7 * dt};
 }

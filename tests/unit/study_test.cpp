@@ -322,7 +322,7 @@ TEST(Dial, ReadsErrorsAndLayersOffACurve)
 TEST(Dial, ProposesTheCheapestThatReachesTheError)
 {
     const auto scene = block(0.1, "", 3);
-    const auto cost = [](const scene::Ready& r) {
+    const auto cost = [](const scene::CheckedScene& r) {
         return std::pow(r.scene.space.spacing, -4) * (r.scene.accuracy.preset == scene::Preset::Fast ? 0.01 : 1);
     };
     const auto coarse = propose(scene, 0.15, read_measured(table_text), cost);
@@ -332,8 +332,8 @@ TEST(Dial, ProposesTheCheapestThatReachesTheError)
     EXPECT_LE(fine.expected, 0.05);
     EXPECT_LE(fine.low, fine.expected);
     EXPECT_GE(fine.high, fine.expected);
-    EXPECT_LE(fine.ready->scene.space.spacing, 0.8 / 25.6);
-    EXPECT_TRUE(scene::Filling::problems(fine.ready->scene).empty());
+    EXPECT_LE(fine.checked->scene.space.spacing, 0.8 / 25.6);
+    EXPECT_TRUE(scene::Filling::problems(fine.checked->scene).empty());
     EXPECT_EQ(fine.nearest, "cube");
     EXPECT_LT(fine.distance, 0.1);
     EXPECT_THAT(to_text(fine, 0.05, 12), HasSubstr("preset = \"standard\""));

@@ -119,15 +119,15 @@ inline Vector origin(const Simulation& s, Index i) { return s.particles()[field:
 inline Vector velocity(const Simulation& s, Index i) { return s.particles()[field::velocity][i]; }
 inline Stress stress(const Simulation& s, Index i) { return s.particles()[field::stress][i]; }
 
-using Places = std::map<std::int64_t, Vector>; // by id, m
-inline Places places(const Simulation& s)
+using Positions = std::map<std::int64_t, Vector>; // by id, m
+inline Positions positions(const Simulation& s)
 {
-    Places x;
+    Positions x;
     each(s, [&](Index i) { x[s.particles()[field::id][i]] = position(s, i); });
     return x;
 }
 /// Ways of all particles from where they were, m, each handed to visit.
-template <class Visit> void each_way(const Simulation& s, const Places& from, Visit visit)
+template <class Visit> void each_way(const Simulation& s, const Positions& from, Visit visit)
 {
     each(s, [&](Index i) { visit(length(position(s, i) - from.at(s.particles()[field::id][i]))); });
 }

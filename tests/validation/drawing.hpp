@@ -503,7 +503,7 @@ struct Motions {
     double taken = 0, given = 0; // most and least work taken by walls, over the largest energy met till then
     double moved = 0;            // m, farthest way up or down in the first drawing
 };
-/// Places at the end of a run of soil that does not yield.
+/// Positions at the end of a run of soil that does not yield.
 inline Motions motion(const Generated& g, const Placed& soil, double end, SceneText t)
 {
     t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.1 }", t.end = end;
@@ -518,13 +518,13 @@ inline Motions motion(const Generated& g, const Placed& soil, double end, SceneT
     for (const Drawing& d : g.drawings) {
         Simulation sim(Comm::world(), scene_of(g, d, soil.x.size(), t), placed(g, d, soil));
         double most = 1e-300;
-        const auto look = [&] {
+        const auto observe = [&] {
             const Ledger l = sim.ledger();
             most = std::max(most, l.state.kinetic + l.state.elastic + std::max(0.0, -l.state.potential));
             worst.taken = std::max(worst.taken, l.dissipated.wall / most), worst.given = std::min(worst.given, l.dissipated.wall / most);
         };
-        look();
-        while (!sim.finished()) sim.step(), look();
+        observe();
+        while (!sim.finished()) sim.step(), observe();
         std::vector<Vector> at(soil.x.size());
         each(sim, [&](Index i) { at[std::size_t(sim.particles()[field::id][i])] = position(sim, i); });
         if (measure.empty()) {

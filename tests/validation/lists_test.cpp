@@ -60,7 +60,7 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
                 t.accuracy = fmt::format("kernel = \"{}\"\nprecision = \"{}\"\nskin = 0.1\ncfl = 0.4\n", kernel, precision);
                 Simulation sim(Comm::world(), t.scene());
                 const std::string name = fmt::format("{}, {}, {}", c.name, precision, kernel);
-                for (int look = 0; look < 6; ++look) {
+                for (int round = 0; round < 6; ++round) {
                     for (int k = 0; k < 37; ++k) sim.step();
                     const auto before = sim.pairs();
                     sim.step();

@@ -98,7 +98,7 @@ TEST(Operators, StandardGradientConvergesToItsFloor)
     for (int i = -3; i <= 3; ++i)
         for (int k = -3; k <= 3; ++k) {
             const double x = i * t.spacing, r = std::hypot(x, k * t.spacing);
-            if (r > 0) m -= t.spacing * t.spacing * x * x * kernel.scale * kernel.shape(std::max(2 * kernel.h - r, 0.0), r, 1 / r);
+            if (r > 0) m -= t.spacing * t.spacing * x * x * kernel.scale * kernel.F(std::max(2 * kernel.h - r, 0.0), r, 1 / r);
         }
     EXPECT_TRUE(c.near("floor on a lattice, h/dx = 1.5", std::fabs(m - 1), of(1.5, 0, 1, 40), "1", 1e-9));
     EXPECT_TRUE(c.near("floor at half the spacing", of(1.5, 0, 1, 40), of(1.5, 0, 1, 80), "1", 1e-9));

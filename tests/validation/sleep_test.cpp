@@ -50,7 +50,7 @@ TEST(Sleep, GroundSleepsUntilTheBlowComesAndAnswersItAsIfItHadNotSlept)
     EXPECT_GT(before, 0.5) << "ground at rest lies awake";
     run_to(off, 0.5), run_to(on, 0.5);
 
-    const auto expected = places(off), found = places(on);
+    const auto expected = positions(off), found = positions(on);
     double moved = 0;
     std::vector<double> apart; // a few grains of the splash go their own ways
     each(on, [&](Index i) {
@@ -73,7 +73,7 @@ TEST(Sleep, GroundSleepsUntilTheBlowComesAndAnswersItAsIfItHadNotSlept)
 
 TEST(Sleep, NoSleeperIsMissedByAWave)
 {
-    // Whoever sleeps at a look was calm with calm neighbours: until the next look no particle may have come to move fast.
+    // What sleeps at a check was calm with calm neighbours: until the next check no particle may have come to move fast.
     Simulation sim(Comm::world(), struck_ground(slow).scene());
     const auto every = scene::sleep_interval(sim.scene());
     ASSERT_GT(every, 3);

@@ -41,7 +41,7 @@ double lattice_gradient(const SceneText& t)
     for (int i = -4; i <= 4; ++i)
         for (int k = -4; k <= 4; ++k) {
             const double x = i * t.spacing, r = std::hypot(x, k * t.spacing);
-            if (r > 0) sum -= t.spacing * t.spacing * x * x * kernel.scale * kernel.shape(std::max(2 * kernel.h - r, 0.0), r, 1 / r);
+            if (r > 0) sum -= t.spacing * t.spacing * x * x * kernel.scale * kernel.F(std::max(2 * kernel.h - r, 0.0), r, 1 / r);
         }
     return sum;
 }

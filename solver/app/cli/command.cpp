@@ -20,12 +20,12 @@ void SceneArguments::add_to(CLI::App& app)
     app.add_flag("--force-step", force_step, "accept a fixed step above the stable limit");
 }
 
-scene::Ready SceneArguments::read(const Comm& comm) const
+scene::CheckedScene SceneArguments::read(const Comm& comm) const
 {
     std::string text;
     io::on_root(comm, [&] { text = io::read_scene_text(file); });
     text = comm.broadcast(text);
-    return io::parse_ready_scene(text, file, sets, step_limit());
+    return io::parse_checked_scene(text, file, sets, step_limit());
 }
 
 io::Path SceneArguments::results(const Scene& scene, const std::string& asked) const
@@ -83,7 +83,7 @@ int cores_here()
 
 int use_threads(const Comm& comm, int threads)
 {
-    const int on_node = comm.node_place().size; // on all ranks, whatever each was told
+    const int on_node = comm.node_position().size; // on all ranks, whatever each was told
     const char* asked = threads > 0 ? nullptr : std::getenv("OMP_NUM_THREADS");
     const long wanted = asked ? std::strtol(asked, nullptr, 10) : 0;
     if (comm.any(wanted > most_threads))
@@ -96,15 +96,15 @@ int use_threads(const Comm& comm, int threads)
 
 std::string too_many_threads(const Comm& comm, int threads)
 {
-    const auto place = comm.node_place();
+    const auto here = comm.node_position();
     const int cores = std::max(1, int(sysconf(_SC_NPROCESSORS_ONLN))), mine = cores_here();
     std::string why;
     if (threads > mine)
         why = fmt::format("{} threads on {} core{} that this rank may use: they wait for each other. Remedy: --threads {}{}", threads, mine,
                           mine == 1 ? "" : "s", mine, mine < cores ? ", or a launcher that does not bind ranks to fewer" : "");
-    else if (threads * place.size > cores)
+    else if (threads * here.size > cores)
         why = fmt::format("{} ranks of {} thread{} on a node of {} core{}: they wait for each other. Remedy: fewer ranks or --threads {}",
-                          place.size, threads, threads == 1 ? "" : "s", cores, cores == 1 ? "" : "s", std::max(1, cores / place.size));
+                          here.size, threads, threads == 1 ? "" : "s", cores, cores == 1 ? "" : "s", std::max(1, cores / here.size));
     // Ranks may sit on different nodes: the first that has something to say speaks for all.
     std::int64_t speaker = comm.max(why.empty() ? std::int64_t(-1) : std::int64_t(comm.size() - comm.rank()));
     return speaker < 0 ? std::string() : comm.broadcast(why, comm.size() - int(speaker));

@@ -23,14 +23,14 @@ struct SceneArguments {
     bool force_step = false;
     void add_to(CLI::App&);
     /// Collective: rank 0 reads the file, every rank parses. Throws BadInput on all ranks.
-    scene::Ready read(const Comm&) const;
+    scene::CheckedScene read(const Comm&) const;
     scene::StepLimit step_limit() const { return force_step ? scene::StepLimit::Force : scene::StepLimit::Enforce; }
     /// Where the results go: the directory asked for, or the scene's, or results/<scene file's name>.
     io::Path results(const Scene&, const std::string& asked) const;
 };
 
 /// What kuzure check says of a scene. Collective.
-Exit tell_of_run(const Comm&, const SceneArguments&);
+Exit print_estimate(const Comm&, const SceneArguments&);
 
 /// A command: adds itself to the command line; when chosen, `chosen` is set to what it does.
 using Action = std::function<Exit(const Comm&)>;
@@ -44,7 +44,7 @@ void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);
 
-/// A line for whoever runs the program, on standard error. Never throws: where nobody can read it, the work goes on.
+/// A line for the user, on standard error. Never throws: where it cannot be written, the work goes on.
 void complain(const std::string& text) noexcept;
 
 /// The program's version, git hash, compiler and instruction set.
@@ -62,7 +62,7 @@ void require_one_program(const Comm&);
 /// The cores this process may use.
 int cores_here();
 
-/// Nobody's node has more.
+/// No node has more.
 inline constexpr int most_threads = 4096;
 
 /// Use this many threads (0: OMP_NUM_THREADS, or the cores of this node shared evenly by its ranks); gives the number. Collective. Throws

@@ -18,14 +18,16 @@ Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy
 {
     const double wanted = study::parse_accuracy(accuracy);
     use_threads(comm, 0);
-    const auto estimate_of = [](const scene::Ready& r) { return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd)); };
+    const auto estimate_of = [](const scene::CheckedScene& r) {
+        return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd));
+    };
     // Counted, not timed, so that the same is proposed at every call; mixed precision took 0.76 of the time (docs/performance.md).
-    const auto work = [&](const scene::Ready& r) {
+    const auto work = [&](const scene::CheckedScene& r) {
         const Estimate e = estimate_of(r);
         return (e.mixed ? 0.76 : 1) * e.pairs + StepWork::particle * double(e.soil) * double(e.steps);
     };
     const auto proposal = study::propose(s, wanted, study::measured(), work);
-    const auto& r = *proposal.ready;
+    const auto& r = *proposal.checked;
     const double seconds = forecast(comm, r.scene, r.filling, estimate_of(r)).seconds;
     if (comm.rank() == 0)
         fmt::print("{}", json ? study::to_json(proposal, wanted, seconds).dump(2) + "\n" : study::to_text(proposal, wanted, seconds));
@@ -39,9 +41,9 @@ struct Arguments {
     int ranks = 0;
 };
 
-Exit tell(const Comm& comm, const Arguments& a)
+Exit print_facts(const Comm& comm, const Arguments& a)
 {
-    const auto [s, doubts, filling] = a.scene.read(comm);
+    const auto [s, scene_warnings, filling] = a.scene.read(comm);
     if (!a.accuracy.empty()) return turn_the_dial(comm, s, a.accuracy, a.json);
     const auto model = choose_model(s, Arithmetic::Simd);
     const Estimate e = estimate(s, filling, *model);
@@ -61,7 +63,7 @@ Exit tell(const Comm& comm, const Arguments& a)
         time = forecast(comm, s, filling, e);
     }
     std::vector<std::string> warnings;
-    for (const auto& issue : doubts) warnings.push_back(in_words(issue));
+    for (const auto& issue : scene_warnings) warnings.push_back(in_words(issue));
     const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
     if (const auto why = a.machine.empty() ? does_not_fit(comm, e, where) : std::string(); !why.empty())
         warnings.push_back("on this machine kuzure run would refuse this scene: " + why);
@@ -73,7 +75,7 @@ Exit tell(const Comm& comm, const Arguments& a)
 
 } // namespace
 
-Exit tell_of_run(const Comm& comm, const SceneArguments& scene) { return tell(comm, {.scene = scene}); }
+Exit print_estimate(const Comm& comm, const SceneArguments& scene) { return print_facts(comm, {.scene = scene}); }
 
 void add_check(CLI::App& app, Action& chosen)
 {
@@ -90,7 +92,7 @@ void add_check(CLI::App& app, Action& chosen)
     command->add_option("--ranks", a->ranks, "ranks on that machine (default: one node full)")
         ->needs(profile)
         ->check(CLI::Range(1, 1000000000));
-    command->callback([=, &chosen] { chosen = [=](const Comm& comm) { return tell(comm, *a); }; });
+    command->callback([=, &chosen] { chosen = [=](const Comm& comm) { return print_facts(comm, *a); }; });
 }
 
 } // namespace kuzure

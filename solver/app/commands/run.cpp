@@ -57,7 +57,7 @@ void add_run(CLI::App& app, Action& chosen)
     under_heading(*command, "Machine", {"--threads", "--force-size"});
     command->callback([=, &chosen] {
         if (restarts->count() > 0) a->restart = *restart == "newest" ? "" : *restart;
-        chosen = [=](const Comm& comm) { return a->check_only ? tell_of_run(comm, a->scene) : run_scene(comm, *a); };
+        chosen = [=](const Comm& comm) { return a->check_only ? print_estimate(comm, a->scene) : run_scene(comm, *a); };
     });
 }
 

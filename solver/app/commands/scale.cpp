@@ -24,7 +24,7 @@ Exit scale(const Comm& comm, const Arguments& a)
 {
     if (comm.size() > 1) throw BadInput("kuzure scale counts for any number of ranks on one: expected a start without mpirun");
     use_threads(comm, 0);
-    const auto [s, doubts, filling] = a.scene.read(comm);
+    const auto [s, scene_warnings, filling] = a.scene.read(comm);
     io::MachineProfile machine = machine_named(a.machine);
     const auto model = choose_model(s, Arithmetic::Simd);
     const double bytes = double(row_bytes(*model)), reach = list_reach(s);
@@ -37,9 +37,9 @@ Exit scale(const Comm& comm, const Arguments& a)
         if (a.from.empty()) throw BadInput("--recuts moves the soil from its start to a later state: expected --from DIR");
         auto all = nlohmann::ordered_json::array();
         for (const int n : ranks)
-            all.push_back(
-                {{"ranks", n},
-                 {"cuts", to_json(drift(s, filling, block_space(s, filling, n), n, state.x, state.way, a.recuts, reach, bytes))}});
+            all.push_back({{"ranks", n},
+                           {"cuts", to_json(replay_repartition(s, filling, block_space(s, filling, n), n, state.x, state.way, a.recuts,
+                                                               reach, bytes))}});
         fmt::print("{}\n", all.dump(2));
         return Exit::Ok;
     }

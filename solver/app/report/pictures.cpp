@@ -36,11 +36,11 @@ std::pair<io::Place, Scene> open_results(const Comm& comm, const io::Path& resul
 
 io::PictureTask picture_task(const Scene& scene, const io::Place& results)
 {
-    const scene::Picture look = scene.output.picture.value_or(scene::Picture{});
+    const scene::Picture settings = scene.output.picture.value_or(scene::Picture{});
     io::PictureTask task;
     task.results = results;
-    task.color = io::name_of(look.color);
-    task.view = look.view, task.range = look.range;
+    task.color = io::name_of(settings.color);
+    task.view = settings.view, task.range = settings.range;
     task.dimensions = scene.dimensions, task.spacing = scene.space.spacing, task.title = scene.title;
     return task;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The results of a run as somebody wants to see them: which scene they are of, which pictures belong to them.
+// The results of a run as they are shown: which scene they are of, which pictures belong to them.
 #include "io/picture_series.hpp"
 #include "solver/app/cli/command.hpp"
 #include <utility>

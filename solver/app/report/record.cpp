@@ -79,7 +79,7 @@ std::string Record::text(const char* key) const
 
 Record read_record(const io::Path& directory)
 {
-    // Held: nothing is read through links, which in a directory from somebody else may lead to anything of ours.
+    // Held: nothing is read through links, which in a directory of another user may lead to any file of this one.
     io::Place held;
     try {
         held = io::hold(directory);

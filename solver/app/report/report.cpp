@@ -326,13 +326,11 @@ std::string roofs(const Record& r)
             escaped(word(r.timers["machine"], "host")), escaped(word(r.timers["machine"], "cpu")));
     else
         s += "<p>The roofs of this machine have not been measured yet: <code>kuzure report</code> does it there, in about two seconds, and "
-             "keeps "
-             "them.</p>";
+             "keeps them.</p>";
     return s +
            "<p>Operations and bytes are those the loops declare: additions, multiplications, divisions and roots of every pair inside the "
            "support (square roots and divisions count as one), and the columns, records and lists that must come from memory. "
-           "docs/performance.md compares the "
-           "declaration with the processor's instructions.</p></div></div>\n";
+           "docs/performance.md compares the declaration with the processor's instructions.</p></div></div>\n";
 }
 
 std::string balance(const Record& r)

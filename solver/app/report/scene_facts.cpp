@@ -46,7 +46,7 @@ nlohmann::ordered_json soils_json(const Scene& s, const scene::Filling& f)
     }
     for (const auto& n : scene::soil_numbers(s, f)) {
         auto& soil = all[n.name];
-        soil["unit_weight"] = n.unit_weight, soil["at_rest"] = n.at_rest, soil["stability"] = n.stability;
+        soil["unit_weight"] = n.unit_weight, soil["at_rest"] = n.K0, soil["stability"] = n.stability;
         soil["c_p"] = n.c_p, soil["c_s"] = n.c_s;
     }
     return all;
@@ -83,7 +83,7 @@ nlohmann::ordered_json to_json(const SceneFacts& f)
     const scene::Filling& filling = f.filling;
     const Estimate& e = f.estimate;
     auto numbers = nlohmann::ordered_json::object();
-    for (const auto& n : scene::judge(s, filling)) numbers[n.name] = n.value;
+    for (const auto& n : scene::dimensionless_numbers(s, filling)) numbers[n.name] = n.value;
     nlohmann::ordered_json j{{"soil_particles", e.soil},
                              {"wall_particles", e.walls},
                              {"dt", e.dt},
@@ -119,12 +119,12 @@ std::string to_text(const SceneFacts& f)
     add("{}\n", bodies_and_soils_text(s, filling));
     for (const auto& n : s.notes) add("  {:<4}{}: {}\n", n.on ? "on" : "off", n.name, n.why);
     add("\n");
-    for (const auto& n : scene::judge(s, filling)) add("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);
+    for (const auto& n : scene::dimensionless_numbers(s, filling)) add("  {:<12}{:<9.3g} {}\n", n.name, n.value, n.about);
     add("\n");
     for (const auto& n : scene::soil_numbers(s, filling)) {
         add("  soil {:<10}", n.name);
         if (n.unit_weight > 0) add("unit weight {:.4g} kN/m3, c/(gamma H) {:.3g}, ", 1e-3 * n.unit_weight, n.stability);
-        add("K0 {:.3g}, c_p {:.3g} m/s, c_s {:.3g} m/s\n", n.at_rest, n.c_p, n.c_s);
+        add("K0 {:.3g}, c_p {:.3g} m/s, c_s {:.3g} m/s\n", n.K0, n.c_p, n.c_s);
     }
     for (const auto& w : f.warnings) add("\n  warning: {}\n", w);
     add("\n{}", io::write_scene(s));

@@ -1,5 +1,5 @@
 #pragma once
-// A run's checkpoints: what they say beside the particles, who may go on from one, which is the newest good one.
+// A run's checkpoints: what they hold beside the particles, which run may go on from one, which is the newest good one.
 #include "io/checkpoint.hpp"
 #include "io/result_directory.hpp"
 #include "solver/run/simulation.hpp"

@@ -62,7 +62,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     s.effects = scene_.notes;
     s.state_hash = state_hash(comm_, sim.particles());
     s.message = message;
-    s.host = host_name(), s.hosts = comm_.node_place().nodes, s.warnings = messages_.warnings();
+    s.host = host_name(), s.hosts = comm_.node_position().nodes, s.warnings = messages_.warnings();
     s.predicted_seconds = facts_.forecast.seconds, s.predicted_low = facts_.forecast.low, s.predicted_high = facts_.forecast.high;
     const std::int64_t memory = comm_.max(std::int64_t(sim.memory_bytes()));
     auto j = io::to_json(s);
@@ -83,7 +83,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
                          {"at_rest", settled->at_rest}};
     const double volume = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
     if (volume > 0) j["resting_volume_ratio"] = volume;
-    if (outputs.heap()) j["soil_off_ground"] = outputs.heap()->off_ground;
+    if (outputs.fronts()) j["soil_off_ground"] = outputs.fronts()->off_ground;
     if (facts_.with_twins && code == Exit::Ok) {
         io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, directory_.path(), facts_.peak_speed, facts_.twins); });
         if (messages_.speaks())
@@ -113,8 +113,8 @@ void Ending::warn_of_volume(const Simulation& sim)
 void Ending::write_timers(Simulation& sim)
 {
     auto report = phase_report(sim.timers(), sim.work_done(), facts_.threads, comm_);
-    // The roofs of this machine: those kept, or measured now if nobody waits for it and it does not weigh.
-    const int on_node = facts_.threads * comm_.node_place().size;
+    // The roofs of this machine: those kept, or measured now if the run was long enough to hide the two seconds.
+    const int on_node = facts_.threads * comm_.node_position().size;
     if (comm_.rank() == 0) report.machine = kept_machine(instruction_set(), on_node);
     if (!report.machine && comm_.size() == 1 && facts_.loop_seconds > 20) report.machine = this_machine(instruction_set(), on_node);
     io::on_root(comm_, [&] {

@@ -36,7 +36,7 @@ double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, st
 }
 } // namespace
 
-Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
+Fronts measure_fronts(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
 {
     const double dx = s.space.spacing;
     const auto& start = filling.soil_bounds();
@@ -58,16 +58,16 @@ Heap measure_heap(const Comm& comm, const Particles& p, const Scene& s, const sc
     for (const auto& [key, c] : mine) columns.push_back(c);
     if (comm.size() > 1) {
         // Columns that several ranks share are put together by a rank that their place decides, squares of them by one, so
-        // that nobody ever holds them all.
+        // that no rank ever holds them all.
         std::map<int, std::vector<Column>> to;
         for (const Column& c : columns) {
             const std::uint64_t square = (std::uint64_t(std::uint32_t(c.x >> 5)) << 32 | std::uint32_t(c.y >> 5)) * 0x9E3779B97F4A7C15u;
             to[int((square >> 32) % std::uint64_t(comm.size()))].push_back(c);
         }
-        std::vector<Parcel<Column>> parcels;
-        for (auto& [rank, which] : to) parcels.push_back({rank, std::move(which)});
+        std::vector<MessageOf<Column>> typed;
+        for (auto& [rank, which] : to) typed.push_back({rank, std::move(which)});
         std::unordered_map<std::int64_t, Column> all;
-        for (const auto& part : comm.exchange(parcels))
+        for (const auto& part : comm.exchange(typed))
             for (const Column& c : part.items) {
                 auto& sum = all.try_emplace(std::int64_t(c.x) << 32 | std::uint32_t(c.y), Column{c.x, c.y, 0, c.top}).first->second;
                 sum.count += c.count;

@@ -7,7 +7,7 @@ namespace kuzure {
 void Messages::say(const std::string& text)
 {
     if (status_) status_->make_room();
-    // Not by fmt, which throws: a run goes on when nobody can read what it says.
+    // Not by fmt, which throws: a run goes on when its messages cannot be written.
     if (speaks_) std::fputs((text + "\n").c_str(), stdout), std::fflush(stdout);
 }
 

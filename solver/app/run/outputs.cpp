@@ -79,15 +79,15 @@ void Outputs::log_progress(const Simulation& sim)
 void Outputs::write_history(Simulation& sim)
 {
     const Ledger l = sim.ledger();
-    heap_ = measure_heap(comm_, sim.particles(), scene_, sim.filling());
-    const Heap& heap = *heap_;
+    fronts_ = measure_fronts(comm_, sim.particles(), scene_, sim.filling());
+    const Fronts& fronts = *fronts_;
     residual_ = sim.residual(l);
     // energy.cpp's sums, and the columns they and the heap read
     const auto n = double(sim.particles().size());
     sim.timers().did(Phase::History, 45 * n, 20 * 8 * n);
     history_->append({sim.time(), sim.steps(), sim.dt(), l.state.kinetic, l.state.potential, l.state.elastic, l.dissipated.plastic,
-                      l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_, sim.max_speed(), heap.height, heap.min_x,
-                      heap.max_x, heap.min_y, heap.max_y, l.dissipated.stabilising, 0.0});
+                      l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_, sim.max_speed(), fronts.height,
+                      fronts.min_x, fronts.max_x, fronts.min_y, fronts.max_y, l.dissipated.stabilising, 0.0});
 }
 
 void Outputs::write_snapshot(const Simulation& sim, std::optional<std::int64_t> failed)

@@ -26,7 +26,7 @@ public:
     void sync() { history_->sync(); }
     /// Of the last row of the history; nothing before there is one.
     const std::optional<double>& residual() const { return residual_; }
-    const std::optional<Heap>& heap() const { return heap_; }
+    const std::optional<Fronts>& fronts() const { return fronts_; }
 
 private:
     void open(std::optional<double> restart);
@@ -42,7 +42,7 @@ private:
     std::optional<io::History> history_;
     std::optional<io::ProgressLog> progress_;
     std::optional<double> residual_;
-    std::optional<Heap> heap_;
+    std::optional<Fronts> fronts_;
     double start_, logged_wall_ = 0; // s: of wall_clock(), since start_
     std::int64_t logged_step_ = 0;
 };

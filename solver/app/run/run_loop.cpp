@@ -20,9 +20,9 @@ namespace {
 
 class Run {
 public:
-    Run(const Comm& comm, const RunArguments& a, scene::Ready ready, bool twin = false)
-        : comm_(comm), args_(a), threads_(use_threads(comm, a.threads)), scene_(std::move(ready.scene)), doubts_(std::move(ready.warnings)),
-          filling_(std::move(ready.filling)), messages_(comm.rank() == 0, a.quiet, twin)
+    Run(const Comm& comm, const RunArguments& a, scene::CheckedScene checked, bool twin = false)
+        : comm_(comm), args_(a), threads_(use_threads(comm, a.threads)), scene_(std::move(checked.scene)),
+          scene_warnings_(std::move(checked.warnings)), filling_(std::move(checked.filling)), messages_(comm.rank() == 0, a.quiet, twin)
     {
         facts_.start = wall_clock(), facts_.scene_hash = io::scene_hash(scene_), facts_.threads = threads_, facts_.with_twins = a.twins;
     }
@@ -37,9 +37,9 @@ public:
                 return Exit::Stopped;
             }
             if (args_.twins) {
-                auto twins =
-                    run_twins(comm_, args_, scene_, *directory_, messages_, facts_.start,
-                              [&](const RunArguments& a, scene::Ready ready) { return Run(comm_, a, std::move(ready), true).go(); });
+                auto twins = run_twins(
+                    comm_, args_, scene_, *directory_, messages_, facts_.start,
+                    [&](const RunArguments& a, scene::CheckedScene checked) { return Run(comm_, a, std::move(checked), true).go(); });
                 if (!twins) return stop_before_the_run();
                 facts_.twins = std::move(*twins);
             }
@@ -57,7 +57,7 @@ private:
 
     void open()
     {
-        for (const auto& issue : doubts_) messages_.warn(in_words(issue));
+        for (const auto& issue : scene_warnings_) messages_.warn(in_words(issue));
         if (const auto why = too_many_threads(comm_, threads_); !why.empty()) messages_.warn(why);
         const io::Path where = args_.scene.results(scene_, args_.output);
         // From here on no other run touches what is there.
@@ -247,7 +247,7 @@ private:
     void show_status(bool final)
     {
         if (!messages_.due(final)) return;
-        messages_.show({sim_->time(), sim_->steps(), sim_->dt(), sim_->max_speed(), outputs_->residual(), outputs_->heap(),
+        messages_.show({sim_->time(), sim_->steps(), sim_->dt(), sim_->max_speed(), outputs_->residual(), outputs_->fronts(),
                         scene_.dimensions, comm_.size(), sim_->balance().imbalance()},
                        final);
     }
@@ -290,7 +290,7 @@ private:
     RunArguments args_;
     int threads_;
     Scene scene_;
-    scene::Issues doubts_;
+    scene::Issues scene_warnings_;
     std::optional<scene::Filling> filling_; // until the simulation has it
     Messages messages_;
     RunFacts facts_;

@@ -59,18 +59,18 @@ std::string first_fault(const Particles& p, const Scene& scene, std::int64_t cou
     return {};
 }
 
-/// An id that this rank was told twice; -1 if there is none. Each rank hears of a range of ids.
+/// An id that this rank received twice; -1 if there is none. Each rank checks a range of ids.
 std::int64_t doubled(const Comm& comm, const Particles& p, std::int64_t count)
 {
     const std::int64_t ranks = comm.size(), share = std::max<std::int64_t>(1, (count + ranks - 1) / ranks);
-    std::vector<Parcel<std::int64_t>> out;
+    std::vector<MessageOf<std::int64_t>> out;
     for (int r = 0; r < comm.size(); ++r) out.push_back({r, {}});
     const auto id = p[field::id];
     for (Index i = 0; i < p.size(); ++i) out[std::size_t(id[i] / share)].items.push_back(id[i]);
-    std::erase_if(out, [](const auto& parcel) { return parcel.items.empty(); });
+    std::erase_if(out, [](const auto& message) { return message.items.empty(); });
     std::vector<bool> seen(std::size_t(share), false);
-    for (const auto& parcel : comm.exchange(out))
-        for (const auto k : parcel.items) {
+    for (const auto& message : comm.exchange(out))
+        for (const auto k : message.items) {
             const auto at = std::size_t(k - share * comm.rank());
             if (seen[at]) return k;
             seen[at] = true;

@@ -24,7 +24,7 @@ std::string duration(double seconds)
     return fmt::format("{} d {} h", s / 86400, s % 86400 / 3600);
 }
 
-/// A terminal that somebody looks at; TERM=dumb says that it cannot move its cursor.
+/// An interactive terminal; TERM=dumb says that it cannot move its cursor.
 bool own_terminal()
 {
     const char* kind = std::getenv("TERM");
@@ -62,13 +62,13 @@ std::string StatusLine::text(const Status& s, double end, double rate, double le
     }
     if (s.residual) out += fmt::format("  energy {:+.3f} %", 100 * *s.residual);
     out += fmt::format("  {:.3g} steps/s  step {}  dt {:.2e}", rate, s.step, s.dt);
-    if (s.heap) {
-        out += fmt::format("  front x {:.2f}..{:.2f}", s.heap->min_x, s.heap->max_x);
-        if (s.dimensions == 3) out += fmt::format(" y {:.2f}..{:.2f}", s.heap->min_y, s.heap->max_y);
+    if (s.fronts) {
+        out += fmt::format("  front x {:.2f}..{:.2f}", s.fronts->min_x, s.fronts->max_x);
+        if (s.dimensions == 3) out += fmt::format(" y {:.2f}..{:.2f}", s.fronts->min_y, s.fronts->max_y);
         out += " m";
     }
     out += fmt::format("  max {:.2f} m/s", s.max_speed);
-    if (s.heap && s.heap->off_ground > 0) out += fmt::format("  off the ground {:.2g} %", 100 * s.heap->off_ground);
+    if (s.fronts && s.fronts->off_ground > 0) out += fmt::format("  off the ground {:.2g} %", 100 * s.fronts->off_ground);
     if (s.ranks > 1) out += fmt::format("  balance {:.2f}", s.imbalance);
     return out;
 }
@@ -84,14 +84,14 @@ void StatusLine::show(const Status& s, bool final)
     last_ = t, time_ = s.time, step_ = s.step;
     const double done = std::clamp(s.time / end_, 0.0, 1.0);
     std::string line = text(s, end_, rate, left);
-    // Not by fmt's print, which throws: a run goes on when nobody can read how far it is.
+    // Not by fmt's print, which throws: a run goes on when the status cannot be written.
     if (!bar_) std::fputs(fmt::format("{:3.0f} %  {}\n", 100 * done, line).c_str(), stdout);
     else {
         winsize size{};
         const int columns = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
         const int width = columns >= 140 ? 20 : 10, full = int(done * width);
         // Longer than the terminal is wide, it could not renew itself.
-        line = cut(line, std::size_t(std::max(0, columns - width - 4)));
+        line = shortened(line, std::size_t(std::max(0, columns - width - 4)));
         std::fputs(fmt::format("\r[{}{}] {}\x1b[K{}", std::string(std::size_t(full), '#'), std::string(std::size_t(width - full), '.'),
                                line, final ? "\n" : "")
                        .c_str(),
@@ -101,7 +101,7 @@ void StatusLine::show(const Status& s, bool final)
     std::fflush(stdout);
 }
 
-std::string StatusLine::cut(const std::string& text, std::size_t columns)
+std::string StatusLine::shortened(const std::string& text, std::size_t columns)
 {
     if (text.size() <= columns) return text;
     const auto end = text.rfind("  ", columns);

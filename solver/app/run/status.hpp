@@ -14,13 +14,13 @@ struct Status {
     std::int64_t step = 0;
     double dt = 0, max_speed = 0;   // s, m/s
     std::optional<double> residual; // 1
-    std::optional<Heap> heap;
+    std::optional<Fronts> fronts;
     int dimensions = 3, ranks = 1;
     double imbalance = 1; // busiest rank over the mean
 };
 
 /// How progress is shown: a bar that renews itself, lines for a log, or not at all. Auto: a bar on a terminal of one's own, lines
-/// elsewhere: in a file, and under mpirun, which gives its ranks a terminal that nobody sees and prints what comes out of it line by line.
+/// elsewhere: in a file, and under mpirun, which gives its ranks a terminal without a screen and prints what comes out of it line by line.
 enum class Progress { Auto, Bar, Plain, None };
 /// "auto", "bar", "plain", "none", in this order.
 const std::vector<std::string>& progress_names();
@@ -40,7 +40,7 @@ public:
     /// The words alone; rate in steps/s, left in s of wall time (negative: unknown).
     static std::string text(const Status&, double end, double rate, double left);
     /// As many of the words as the columns hold, none of them cut.
-    static std::string cut(const std::string& text, std::size_t columns);
+    static std::string shortened(const std::string& text, std::size_t columns);
 
 private:
     bool speaks_, bar_, standing_ = false; // standing: the cursor is behind a bar

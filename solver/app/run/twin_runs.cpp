@@ -26,7 +26,7 @@ std::string earlier_status(const study::TwinRun& t)
 
 std::optional<std::vector<study::TwinRun>> run_twins(const Comm& comm, const RunArguments& args, const Scene& scene,
                                                      const io::ResultDirectory& directory, Messages& messages, double start,
-                                                     const std::function<Exit(const RunArguments&, scene::Ready)>& run)
+                                                     const std::function<Exit(const RunArguments&, scene::CheckedScene)>& run)
 {
     std::vector<study::TwinRun> twins;
     for (const int factor : study::twin_factors) {
@@ -46,7 +46,8 @@ std::optional<std::vector<study::TwinRun>> run_twins(const Comm& comm, const Run
                 else a.restart = ""; // its own newest checkpoint
                 messages.say(fmt::format("twin of {} times the spacing, in {}", factor, t.directory.string()));
                 scene::Issues issues; // coarsened() threw where one is an error
-                if (run(a, scene::ready(t.twin.scene, scene::StepLimit::Force, issues).value()) == Exit::Stopped) return std::nullopt;
+                if (run(a, scene::check_and_fill(t.twin.scene, scene::StepLimit::Force, issues).value()) == Exit::Stopped)
+                    return std::nullopt;
             }
         } catch (const BadInput& e) {
             t.failed = e.what();

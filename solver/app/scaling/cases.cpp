@@ -74,7 +74,7 @@ Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e
     return c;
 }
 
-nlohmann::ordered_json to_json(const std::vector<DriftCut>& cuts)
+nlohmann::ordered_json to_json(const std::vector<ReplayedCut>& cuts)
 {
     auto all = nlohmann::ordered_json::array();
     for (const auto& c : cuts)
@@ -84,7 +84,7 @@ nlohmann::ordered_json to_json(const std::vector<DriftCut>& cuts)
                        {"blocks", c.even.blocks},
                        {"moved_blocks", c.even.moved},
                        {"moved_particles", c.moved_particles},
-                       {"sweeps", c.even.sweeps},
+                       {"sweeps", c.even.iterations},
                        {"rounds", c.even.rounds},
                        {"busy_seconds", c.even.busy},
                        {"cut_bytes", c.cut_bytes},

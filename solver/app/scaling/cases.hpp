@@ -26,7 +26,7 @@ State state_of(const Comm&, const Scene&, const io::Path& from);
 /// those of the start.
 Case count_case(const Scene&, const scene::Filling&, const Estimate&, StepPlace, const std::vector<Vector>& x, Method);
 
-nlohmann::ordered_json to_json(const std::vector<DriftCut>&);
+nlohmann::ordered_json to_json(const std::vector<ReplayedCut>&);
 /// `row_bytes`: of a ghost's record.
 nlohmann::ordered_json to_json(const Case&, double row_bytes, bool per_rank);
 /// Tables for people; `state` says which soil was counted.

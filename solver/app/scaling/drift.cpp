@@ -5,8 +5,9 @@
 
 namespace kuzure {
 
-std::vector<DriftCut> drift(const Scene& s, const scene::Filling& f, const BlockSpace& space, int ranks, const std::vector<Vector>& end,
-                            const std::vector<Vector>& way, int steps, double reach, double row_bytes)
+std::vector<ReplayedCut> replay_repartition(const Scene& s, const scene::Filling& f, const BlockSpace& space, int ranks,
+                                            const std::vector<Vector>& end, const std::vector<Vector>& way, int steps, double reach,
+                                            double row_bytes)
 {
     const BlockGrid grid = space.grid(reach, row_bytes);
     const auto low = space.period_low(), length = space.period_length();
@@ -29,9 +30,9 @@ std::vector<DriftCut> drift(const Scene& s, const scene::Filling& f, const Block
         const BlockOwners all(cut.graph.block, cut.owner);
         for (std::size_t i = 0; i < x.size(); ++i) holder[i] = all.owner_of(space.block_of(x[i]), space.period());
 #pragma omp parallel for schedule(dynamic)
-        for (int r = 0; r < ranks; ++r) known[r] = all, known[r].forget_far(r, space.period());
+        for (int r = 0; r < ranks; ++r) known[r] = all, known[r].keep_neighbourhood(r, space.period());
     }
-    std::vector<DriftCut> cuts;
+    std::vector<ReplayedCut> cuts;
     for (int step = 1; step <= steps; ++step) {
         move(double(step) / steps);
         const auto weighed = weigh(StateSoil(s, f, space, x)).listed;
@@ -59,8 +60,8 @@ std::vector<DriftCut> drift(const Scene& s, const scene::Filling& f, const Block
             const BlockWork& b = weighed[held[i].second];
             listed[held[i].first].push_back({b.block, b.work * double(to - i) / b.particles, double(to - i)});
         }
-        DriftCut c;
-        c.even = even_out(ImaginedCrew(ranks), listed, grid, known);
+        ReplayedCut c;
+        c.even = even_out(VirtualRanks(ranks), listed, grid, known);
         c.moved_particles = migrate();
         for (const auto& k : known) c.known_most = std::max(c.known_most, k.blocks().size());
 

@@ -7,7 +7,7 @@
 namespace kuzure {
 
 /// One cut between neighbours, and what a cut of the whole domain would have been (only at the last step).
-struct DriftCut {
+struct ReplayedCut {
     EvenReport even;
     double cut_bytes = 0; // as CutReport's
     int scattered = 0;    // ranks whose blocks do not hang together
@@ -18,7 +18,7 @@ struct DriftCut {
     int whole_scattered = 0;
 };
 /// `x`: the later state, m; `way`: how each particle came there from its start.
-std::vector<DriftCut> drift(const Scene&, const scene::Filling&, const BlockSpace&, int ranks, const std::vector<Vector>& x,
-                            const std::vector<Vector>& way, int steps, double reach, double row_bytes);
+std::vector<ReplayedCut> replay_repartition(const Scene&, const scene::Filling&, const BlockSpace&, int ranks, const std::vector<Vector>& x,
+                                            const std::vector<Vector>& way, int steps, double reach, double row_bytes);
 
 } // namespace kuzure

@@ -54,7 +54,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     Estimate e{};
     e.soil = f.soil_count(), e.walls = f.wall_count();
     double c = 0;
-    for (const auto& soil : s.soils) c = std::max(c, Material::from(soil).sound_speed);
+    for (const auto& soil : s.soils) c = std::max(c, Material::from(soil).c_p);
     const double h = s.smoothing_length();
     const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
     // A collapse moves at about sqrt(g H): the signal speed that shortens a step which follows the motion.
@@ -112,7 +112,7 @@ std::string bytes_text(double b)
 std::string does_not_fit(const Comm& comm, const Estimate& e, const io::Path& directory, double done)
 {
     // The machine that is worst off decides for all.
-    const double here = comm.node_place().size, have = machine_memory();
+    const double here = comm.node_position().size, have = machine_memory();
     const double need = e.memory * here / comm.size() + bytes_per_process * here;
     const double worst = comm.max(need / have);
     std::string why;

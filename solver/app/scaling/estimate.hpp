@@ -41,8 +41,7 @@ inline constexpr double longest_box = 1e6;
 /// Bytes that every process takes before its first particle: MPI, HDF5, the program.
 inline constexpr double bytes_per_process = 60e6;
 
-/// Bytes that the processes of this machine may have together: what is installed, or less where a container or a job is
-/// limited to less.
+/// Bytes that the processes of this machine may have together: what is installed, or less where a container or a job is limited to less.
 double machine_memory();
 
 /// "1.2 GB"

@@ -124,12 +124,12 @@ Forecast forecast(const Comm& comm, const Scene& s, const scene::Filling& f, con
                                                    e.snapshots / hands * (picture_base + picture_particle * double(e.soil))
                                              : 0;
     const double files = e.snapshots * snapshot_base + (e.snapshots * e.snapshot + e.wall_files + (1 - done) * e.checkpoint) * file_byte;
-    const double rest = lists + slower * ((1 - done) * rows + pictures + files) + 2 * (omp_get_wtime() - begin);
+    const double outside_steps = lists + slower * ((1 - done) * rows + pictures + files) + 2 * (omp_get_wtime() - begin);
     Forecast out;
     out.pair_nanoseconds = 1e9 * pair;
-    out.seconds = in_steps + rest;
+    out.seconds = in_steps + outside_steps;
     // What the rounds differed by, and a tenth for what the model leaves out.
-    out.low = 0.9 * (in_steps * m.pair.front() / pair + rest), out.high = 1.1 * (in_steps * m.pair.back() / pair + rest);
+    out.low = 0.9 * (in_steps * m.pair.front() / pair + outside_steps), out.high = 1.1 * (in_steps * m.pair.back() / pair + outside_steps);
     // Clocks differ between ranks: the root's word counts.
     double all[] = {out.seconds, out.low, out.high, out.pair_nanoseconds};
     comm.broadcast(std::as_writable_bytes(std::span<double>(all)));

@@ -75,7 +75,7 @@ void choose_mode_and_queue(JobPlan& p, const JobArguments& a)
 JobPlan plan_job(const Comm& comm, const JobArguments& a)
 {
     JobPlan p;
-    const auto [scene, doubts, filling] = a.scene.read(comm);
+    const auto [scene, scene_warnings, filling] = a.scene.read(comm);
     p.machine = machine_named(a.machine);
     const auto& m = p.machine;
     p.nodes = a.nodes, p.per_node = a.ranks_per_node > 0 ? a.ranks_per_node : m.node.ranks;

@@ -26,7 +26,7 @@ constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 // Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
 constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
-constexpr double even_sweeps = 55;      // numbers told to all peers, each with a sum over all ranks
+constexpr double even_iterations = 55;  // numbers told to all peers, each with a sum over all ranks
 constexpr double even_rounds = 11;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
 constexpr double even_moves = 0.105;    // particles that migrate, of a rank's
 constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which every rank gets
@@ -35,7 +35,7 @@ constexpr double scalar_ns_here = 59;   // particle_ns of the machine where even
 
 /// Growth of max/mean - 1 a step while soil slides, for a mean rank's soil: smaller parts are crossed sooner. Fitted to
 /// `perf/scaling.py drift` on 4, 16, 32 and 64 ranks (docs/performance.md).
-double drift(double particles) { return 6.1e-5 * std::pow(35152 / std::max(1.0, particles), 0.56); }
+double imbalance_growth(double particles) { return 6.1e-5 * std::pow(35152 / std::max(1.0, particles), 0.56); }
 
 } // namespace
 
@@ -81,16 +81,16 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
     for (const RankLoad& r : ranks) soil += r.particles;
     for (const RankLoad& r : ranks)
         far = std::max(far, r.far_messages + 0.2 * (r.messages - r.far_messages)), most_particles = std::max(most_particles, r.particles);
-    const double everybody = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
+    const double collective = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
     const double cut = at.blocks == 0
                            ? 0
                            : at.blocks / at.ranks * even_seconds * c.particle_ns / scalar_ns_here +
-                                 most_particles * particle * steps_per_rebuild + even_sweeps * (far * latency + latency + everybody) +
-                                 even_rounds * (3 * (messages * latency + everybody) + 2 * everybody) +
-                                 double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + everybody +
+                                 most_particles * particle * steps_per_rebuild + even_iterations * (far * latency + latency + collective) +
+                                 even_rounds * (3 * (messages * latency + collective) + 2 * collective) +
+                                 double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + collective +
                                  even_moves * most_particles * state_bytes * at.ranks_per_node / bandwidth;
     if (cut > 0) {
-        s.recut_steps = std::sqrt(2 * cut / (drift(soil / double(ranks.size())) * s.total()));
+        s.recut_steps = std::sqrt(2 * cut / (imbalance_growth(soil / double(ranks.size())) * s.total()));
         s.recut = 2 * cut / s.recut_steps;
     }
     return s;

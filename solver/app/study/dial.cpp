@@ -29,7 +29,7 @@ double slope(const MeasuredPoint& a, const MeasuredPoint& b)
 }
 
 /// The scene with a preset's keys and a spacing, resolved; nothing where it breaks a rule.
-std::optional<scene::Ready> with(const Scene& scene, const io::Preset& preset, double spacing)
+std::optional<scene::CheckedScene> with(const Scene& scene, const io::Preset& preset, double spacing)
 {
     Scene s = scene;
     // The preset's keys by the reader itself, so that they mean what they mean in a file.
@@ -37,7 +37,7 @@ std::optional<scene::Ready> with(const Scene& scene, const io::Preset& preset, d
     for (const auto& [key, value] : preset.settings) sets.push_back(key + "=" + value);
     if (scene.time.step) s.time.step.reset();
     try {
-        return io::parse_ready_scene(io::write_scene(s), "proposal", sets, scene::StepLimit::Enforce);
+        return io::parse_checked_scene(io::write_scene(s), "proposal", sets, scene::StepLimit::Enforce);
     } catch (const BadInput&) {
         return {};
     }
@@ -130,7 +130,7 @@ double distance(const Likeness& a, const Likeness& b, std::string* why)
 }
 
 Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCurve>& table,
-                 const std::function<double(const scene::Ready&)>& work)
+                 const std::function<double(const scene::CheckedScene&)>& work)
 {
     const Likeness here = likeness(scene);
     const double height = here.layers * scene.space.spacing;
@@ -149,7 +149,7 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
         for (int a = 1; a <= 16; ++a)
             for (int b = 1; b <= 64; ++b)
                 if (std::gcd(a, b) == 1 && scene.space.spacing * a / b <= wanted * (1 + 1e-9)) spacings.insert(scene.space.spacing * a / b);
-        std::optional<scene::Ready> proposed;
+        std::optional<scene::CheckedScene> proposed;
         for (const double spacing : spacings)
             if (spacing > 0.5 * wanted && (proposed = with(scene, preset, spacing))) break;
         if (!proposed) continue;
@@ -170,7 +170,7 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
                                  p.least_layers);
         if (scene.time.step) p.note += std::string(p.note.empty() ? "" : "; ") + "leave time.step out: the step then goes with the spacing";
         if (best && p.work >= best->work) continue;
-        p.ready = std::move(proposed);
+        p.checked = std::move(proposed);
         best = std::move(p);
     }
     if (!best)
@@ -185,7 +185,7 @@ Proposal propose(const Scene& scene, double error, const std::vector<MeasuredCur
 std::string to_text(const Proposal& p, double wanted, double seconds)
 {
     std::string out = fmt::format("accuracy {:g} % of the heap's profile: proposed\n\n", 100 * wanted);
-    out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.ready->scene.space.spacing, p.preset);
+    out += fmt::format("  [space]\n  spacing = {:g}\n\n  [accuracy]\n  preset = \"{}\"\n\n", p.checked->scene.space.spacing, p.preset);
     out += fmt::format("  expected error {:.2g} %; over all measured scenes {:.2g} to {:.2g} %\n", 100 * p.expected, 100 * p.low,
                        100 * p.high);
     const auto [of, unit] = unit_for(seconds);
@@ -198,17 +198,17 @@ std::string to_text(const Proposal& p, double wanted, double seconds)
                                              ? ": another kind of scene, so take the error as a guess and let kuzure run --twins judge it"
                                              : ""));
     if (!p.note.empty()) out += "  note           " + p.note + "\n";
-    for (const auto& w : p.ready->warnings) out += "  warning        " + in_words(w) + "\n";
+    for (const auto& w : p.checked->warnings) out += "  warning        " + in_words(w) + "\n";
     return out;
 }
 
 nlohmann::ordered_json to_json(const Proposal& p, double wanted, double seconds)
 {
     auto warnings = nlohmann::ordered_json::array();
-    for (const auto& w : p.ready->warnings) warnings.push_back(in_words(w));
+    for (const auto& w : p.checked->warnings) warnings.push_back(in_words(w));
     return {{"wanted", wanted},
             {"preset", p.preset},
-            {"spacing", p.ready->scene.space.spacing},
+            {"spacing", p.checked->scene.space.spacing},
             {"expected_error", p.expected},
             {"error_interval", {p.low, p.high}},
             {"predicted_seconds", seconds},

@@ -44,18 +44,19 @@ double distance(const Likeness& scene, const Likeness& measured, std::string* wh
 
 struct Proposal {
     std::string preset;
-    std::optional<scene::Ready> ready; // the scene with the proposed spacing and keys, and its warnings
-    double expected = 0;               // error, 1
-    double low = 0, high = 0;          // of all measured scenes
-    double work = 0;                   // as `work` gave it
-    std::string nearest, difference;   // the measured scene it rests on, and how that differs
+    std::optional<scene::CheckedScene> checked; // the scene with the proposed spacing and keys, and its warnings
+    double expected = 0;                        // error, 1
+    double low = 0, high = 0;                   // of all measured scenes
+    double work = 0;                            // as `work` gave it
+    std::string nearest, difference;            // the measured scene it rests on, and how that differs
     double distance = 0;
     double least_layers = 0, most_layers = 0; // measured; beyond them the error is an extrapolation
     std::string note;                         // what could not be had
 };
 /// The settings that reach the error on this scene with the least work. Spacings are tried that fill its bodies whole; fixed steps
 /// go with the smoothing length. Throws BadInput where none is found.
-Proposal propose(const Scene&, double error, const std::vector<MeasuredCurve>&, const std::function<double(const scene::Ready&)>& work);
+Proposal propose(const Scene&, double error, const std::vector<MeasuredCurve>&,
+                 const std::function<double(const scene::CheckedScene&)>& work);
 /// For the terminal, and for --json; with the seconds that it will take here.
 std::string to_text(const Proposal&, double wanted, double seconds);
 nlohmann::ordered_json to_json(const Proposal&, double wanted, double seconds);

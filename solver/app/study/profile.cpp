@@ -24,7 +24,7 @@ std::optional<std::array<double, 2>> common_axis(const Scene& s)
     return axis;
 }
 
-/// Places per window: the profile is smooth over a window, so this many show all of it.
+/// Positions per window: the profile is smooth over a window, so this many show all of it.
 const int places_per_window = 8;
 
 } // namespace
@@ -76,39 +76,39 @@ Profile measure_profile(const Scene& s, const io::SoilSnapshot& soil, double win
     p.start_low = start.low.x - half, p.start_high = start.high.x + half;
 
     // A particle is a square (2-D), an upright slab of its volume; its place along the spread is smeared over one spacing.
-    std::vector<double> place;
+    std::vector<double> along;
     double across = 1; // m, width of what is measured at right angles to the spread
     if (p.spread == Spread::Radial) {
         p.start_low = 0, p.start_high = 0.5 * (p.start_high - p.start_low);
         // the body's own radius: the lattice's bounds may stop short of it
         for (const auto& body : s.bodies)
             if (const auto* c = std::get_if<scene::Cylinder>(&body.shape)) p.start_high = std::max(p.start_high, c->radius);
-        for (const Vector& x : soil.position) place.push_back(std::hypot(x.x - (*axis)[0], x.y - (*axis)[1]));
+        for (const Vector& x : soil.position) along.push_back(std::hypot(x.x - (*axis)[0], x.y - (*axis)[1]));
     } else if (p.spread == Spread::Band) {
         const double middle = 0.5 * (start.low.y + start.high.y), width = start.high.y - start.low.y + dx;
         across = 0.5 * width;
         for (const Vector& x : soil.position)
-            if (std::fabs(x.y - middle) < 0.5 * across) place.push_back(x.x);
-        if (place.empty()) return p;
+            if (std::fabs(x.y - middle) < 0.5 * across) along.push_back(x.x);
+        if (along.empty()) return p;
     } else {
-        for (const Vector& x : soil.position) place.push_back(x.x);
+        for (const Vector& x : soil.position) along.push_back(x.x);
     }
-    std::sort(place.begin(), place.end());
+    std::sort(along.begin(), along.end());
     // Volume up to a place: particles count from half a spacing before their centre to half a spacing behind, linearly.
-    std::vector<double> sums(place.size() + 1, 0);
-    for (std::size_t i = 0; i < place.size(); ++i) sums[i + 1] = sums[i] + place[i];
+    std::vector<double> sums(along.size() + 1, 0);
+    for (std::size_t i = 0; i < along.size(); ++i) sums[i + 1] = sums[i] + along[i];
     const auto count_below = [&](double x) {
-        const auto whole = std::size_t(std::upper_bound(place.begin(), place.end(), x - half) - place.begin());
-        const auto touched = std::size_t(std::lower_bound(place.begin(), place.end(), x + half) - place.begin());
+        const auto whole = std::size_t(std::upper_bound(along.begin(), along.end(), x - half) - along.begin());
+        const auto touched = std::size_t(std::lower_bound(along.begin(), along.end(), x + half) - along.begin());
         const double n = double(touched - whole);
         return double(whole) + (n * (x + half) - (sums[touched] - sums[whole])) / dx;
     };
 
     // Beside a wall, where the soil has not moved outwards, the window must not look behind it.
     const bool radial = p.spread == Spread::Radial;
-    const bool stays_low = radial || place.front() - half > p.start_low - 0.25 * window;
-    const bool stays_high = !radial && place.back() + half < p.start_high + 0.25 * window;
-    const double first = stays_low ? p.start_low : place.front() - window, last = stays_high ? p.start_high : place.back() + window;
+    const bool stays_low = radial || along.front() - half > p.start_low - 0.25 * window;
+    const bool stays_high = !radial && along.back() + half < p.start_high + 0.25 * window;
+    const double first = stays_low ? p.start_low : along.front() - window, last = stays_high ? p.start_high : along.back() + window;
     const double apart = window / places_per_window;
     const auto n = std::size_t(std::ceil((last - first) / apart)) + 1;
     const double volume = s.particle_volume();
@@ -185,7 +185,7 @@ AtRest measure_at_rest(const Scene& s, const io::SoilSnapshot& soil)
         e2 += e * e, r2 += expected * expected;
         if (z > top - s.space.spacing) way -= soil.displacement[i].z, ++n;
     }
-    const double modulus = m.density * m.sound_speed * m.sound_speed;
+    const double modulus = m.density * m.c_p * m.c_p;
     // The top row's centre lies half a spacing below the top.
     const double depth = half;
     return {std::sqrt(e2 / r2), n ? way / double(n) : 0, weight * (height * height - depth * depth) / (2 * modulus)};

@@ -12,7 +12,7 @@ namespace kuzure::study {
 /// x in a band through its middle.
 enum class Spread { Plane, Radial, Band };
 
-/// Places and heights (m) along the spread; x counts from the origin in Plane and Band, from the axis in Radial.
+/// Positions and heights (m) along the spread; x counts from the origin in Plane and Band, from the axis in Radial.
 struct Profile {
     Spread spread = Spread::Plane;
     std::vector<double> at, height;

@@ -143,7 +143,7 @@ Study plan(const io::Sweep& sweep)
             p.spacing = s.space.spacing;
             const scene::Filling filling(s);
             p.predicted_pairs = estimate(s, filling, *choose_model(s, Arithmetic::Simd)).pairs;
-            for (const auto& n : scene::judge(s, filling)) {
+            for (const auto& n : scene::dimensionless_numbers(s, filling)) {
                 if (n.name == "base_strain") p.base_strain = n.value;
                 if (n.name == "mach") p.mach = n.value;
             }

@@ -1,21 +1,22 @@
 #pragma once
-// Ranks that work in rounds of messages: one here among those of a run, or all of a run that is only imagined, so that what
+// Ranks that work in rounds of messages: the one of this process among those of a run, or all of a run that does not exist, so that what
 // many ranks would agree on can be tried in one program.
 #include "decomposition/comm.hpp"
 
 namespace kuzure {
 
-/// Ranks first() .. first() + here() - 1 of size() are played here. Everything is collective.
-class Crew {
+/// Ranks first() .. first() + here() - 1 of size() are computed here. Everything is collective.
+class RankGroup {
 public:
-    virtual ~Crew() = default;
+    virtual ~RankGroup() = default;
     virtual int size() const = 0;
     virtual int first() const = 0;
     virtual int here() const = 0;
-    /// Each rank here sends to whom it likes; what arrives for each, by sender.
+    /// Each rank here sends to any ranks; what arrives for each, by sender.
     virtual std::vector<std::vector<Message>> exchange(std::vector<std::vector<Message>> out) const = 0;
-    /// Each rank here tells all its peers one number and hears one of each; peers know each other.
-    virtual std::vector<std::vector<double>> tell(const std::vector<std::vector<int>>& peers, std::span<const double> mine) const = 0;
+    /// Each rank here exchanges one number with each of its peers; being peers is mutual.
+    virtual std::vector<std::vector<double>> exchange_scalar(const std::vector<std::vector<int>>& peers,
+                                                             std::span<const double> mine) const = 0;
     /// Sums and maxima over all ranks, of figures that are already those of all ranks here.
     virtual void sum(std::span<double>) const = 0;
     virtual void max(std::span<double>) const = 0;
@@ -23,22 +24,22 @@ public:
     virtual std::vector<std::array<std::int32_t, 6>> allgather(std::span<const std::array<std::int32_t, 6>> mine) const = 0;
 
     /// Typed.
-    template <class T> std::vector<std::vector<Parcel<T>>> exchange(const std::vector<std::vector<Parcel<T>>>& out) const
+    template <class T> std::vector<std::vector<MessageOf<T>>> exchange(const std::vector<std::vector<MessageOf<T>>>& out) const
     {
         std::vector<std::vector<Message>> bytes(out.size());
         for (std::size_t k = 0; k < out.size(); ++k) bytes[k] = to_messages(std::span(out[k]));
         auto arrived = exchange(std::move(bytes));
-        std::vector<std::vector<Parcel<T>>> in(arrived.size());
+        std::vector<std::vector<MessageOf<T>>> in(arrived.size());
         for (std::size_t k = 0; k < arrived.size(); ++k) in[k] = from_messages<T>(arrived[k]);
         return in;
     }
 };
 
 /// The ranks of a run.
-class RunCrew final : public Crew {
+class RunRanks final : public RankGroup {
 public:
-    explicit RunCrew(const Comm& comm) : comm_(comm) {}
-    using Crew::exchange;
+    explicit RunRanks(const Comm& comm) : comm_(comm) {}
+    using RankGroup::exchange;
     int size() const override { return comm_.size(); }
     int first() const override { return comm_.rank(); }
     int here() const override { return 1; }
@@ -46,9 +47,10 @@ public:
     {
         return {comm_.exchange(std::move(out[0]))};
     }
-    std::vector<std::vector<double>> tell(const std::vector<std::vector<int>>& peers, std::span<const double> mine) const override
+    std::vector<std::vector<double>> exchange_scalar(const std::vector<std::vector<int>>& peers,
+                                                     std::span<const double> mine) const override
     {
-        return {comm_.tell(peers[0], mine[0])};
+        return {comm_.exchange_scalar(peers[0], mine[0])};
     }
     void sum(std::span<double> v) const override { comm_.sum(v); }
     void max(std::span<double> v) const override { comm_.max(v); }
@@ -62,10 +64,10 @@ private:
 };
 
 /// Any number of ranks, all of them here.
-class ImaginedCrew final : public Crew {
+class VirtualRanks final : public RankGroup {
 public:
-    explicit ImaginedCrew(int ranks) : ranks_(ranks) {}
-    using Crew::exchange;
+    explicit VirtualRanks(int ranks) : ranks_(ranks) {}
+    using RankGroup::exchange;
     int size() const override { return ranks_; }
     int first() const override { return 0; }
     int here() const override { return ranks_; }
@@ -76,7 +78,8 @@ public:
             for (Message& m : out[from]) in[m.rank].push_back({from, std::move(m.bytes)});
         return in;
     }
-    std::vector<std::vector<double>> tell(const std::vector<std::vector<int>>& peers, std::span<const double> mine) const override
+    std::vector<std::vector<double>> exchange_scalar(const std::vector<std::vector<int>>& peers,
+                                                     std::span<const double> mine) const override
     {
         std::vector<std::vector<double>> heard(peers.size());
         for (std::size_t k = 0; k < peers.size(); ++k)
