@@ -266,6 +266,7 @@ def figure(rows, directory, results):
     """Plain cases over viscosity, and every other case as a bar beside the program's limit."""
     plain = [r for r in rows if r["case"] in ("bar", "column", "collapse")]
     other = [r for r in rows if r not in plain]
+    places = list(dict.fromkeys((r["case"], r["kernel"], r["h"]) for r in other))
     data = os.path.join(results, "step_map.dat")
     with open(data, "w") as f:
         for name in ("bar", "column", "collapse"):
@@ -275,10 +276,11 @@ def figure(rows, directory, results):
                         f.write(f"{r['alpha']} {r['stable']} {r['accurate']} {REFUSED * r['limit']}\n")
                 f.write("\n\n")
         for alpha in (0.1, 1.0):
-            names = [r for r in other if r["alpha"] == alpha]
-            for i, r in enumerate(names):
-                name = r["case"] if (r["kernel"], r["h"]) == DEFAULT else f"{r['case']}, {r['kernel']} {r['h']}"
-                f.write(f"{len(names) - i} {r['stable']} {r['accurate']} {REFUSED * r['limit']} \"{name}\"\n")
+            for i, key in enumerate(places):
+                for r in other:
+                    if (r["case"], r["kernel"], r["h"]) == key and r["alpha"] == alpha:
+                        name = key[0] if key[1:] == DEFAULT else f"{key[0]}, {key[1]} {key[2]}"
+                        f.write(f"{len(places) - i} {r['stable']} {r['accurate']} {REFUSED * r['limit']} \"{name}\"\n")
             f.write("\n\n")
     script = [
         f"set terminal pngcairo size 1300,1150 font 'sans,10'\nset output '{directory}/step_map.png'\nset multiplot",
@@ -294,8 +296,7 @@ def figure(rows, directory, results):
         key = "set key bottom right font ',8'" if i == 0 else "unset key"
         script.append(f"set size 0.333,0.36\nset origin {i / 3},0.64\n{key}\nset title '{name}: filled stable, open accurate, dotted refused above'")
         script.append(f"plot {', '.join(lines)}, 1 dt 2 lc 'black' notitle")
-    count = sum(r["alpha"] == 0.1 for r in other)
-    script.append(f"set yrange [0.3:{count + 0.7}]\nset xrange [0:2.4]\nset xlabel 'dt c_p/h'\nunset ylabel\nset key bottom left font ',8'")
+    script.append(f"set yrange [0.3:{len(places) + 0.7}]\nset xrange [0:2.6]\nset xlabel 'dt c_p/h'\nunset ylabel\nset key bottom left font ',8'")
     for i, alpha in enumerate((0.1, 1.0)):
         index = 3 * len(KERNELS) + i
         left, width = (0.0, 0.6) if i == 0 else (0.6, 0.4)
@@ -324,8 +325,9 @@ def table(rows):
         stable = f"**{r['stable']:.2f}**" if r["stable"] < 0.999 * refused else f"{r['stable']:.2f}"
         accurate = f"{r['accurate']:.2f}" if r["accurate"] > 0 else "-"
         cells.setdefault((r["case"], r["kernel"], r["h"]), {})[r["alpha"]] = f"{stable} / {accurate} ({refused:.2f})"
-    lines = ["| case | kernel, h | " + " | ".join(f"alpha {a:g}" for a in ALPHAS) + " |", "|" + "---|" * (2 + len(ALPHAS))]
-    lines += [f"| {case} | {kernel}, {h} | " + " | ".join(cell.get(a, "") for a in ALPHAS) + " |" for (case, kernel, h), cell in cells.items()]
+    alphas = [a for a in ALPHAS if any(a in cell for cell in cells.values())]
+    lines = ["| case | kernel, h | " + " | ".join(f"alpha {a:g}" for a in alphas) + " |", "|" + "---|" * (2 + len(alphas))]
+    lines += [f"| {case} | {kernel}, {h} | " + " | ".join(cell.get(a, "") for a in alphas) + " |" for (case, kernel, h), cell in cells.items()]
     return "\n".join(lines) + "\n"
 
 
