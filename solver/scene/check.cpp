@@ -467,7 +467,8 @@ double courant_limit(const Scene& scene)
             limit = std::min(limit, 4 / (std::sqrt(damped * damped + 4 * kappa * kappa) + damped));
         }
     }
-    // Corrected gradients are larger at free surfaces than those of the lattice: an elastic bar stood 0.84 of its limit (0.80 at alpha = 1).
+    // Corrected gradients are larger at free surfaces than those of the lattice: an elastic bar stood 0.84 of its limit (0.80 at alpha =
+    // 1).
     return scene.accuracy.correction == Correction::Gradient ? 0.85 * limit : limit;
 }
 double unstable_courant(const Scene& scene) { return scene.accuracy.scheme == Scheme::LeapFrog ? 0.6 : 0.93 * courant_limit(scene); }
