@@ -34,8 +34,8 @@ int main()
     const auto back = kuzure::return_to_cone(trial, law);
     const auto model = kuzure::choose_model(s, kuzure::Arithmetic::Simd);
     const double out = kuzure::yield_function(trial, law), on = kuzure::yield_function(back.sigma, law);
-    std::printf("%s outside %g, on the cone %g, work %g\\n", model->name().c_str(), out, on, back.work);
-    return out > 100 && on < 1e-9 && on > -1e-9 && back.work > 0 && model->cluster_width() > 0 ? 0 : 1;
+    std::printf("%s outside %g, on the cone %g, work %g\\n", model->name().c_str(), out, on, back.plastic_work);
+    return out > 100 && on < 1e-9 && on > -1e-9 && back.plastic_work > 0 && model->cluster_width() > 0 ? 0 : 1;
 }
 """
 SCENE = """#include <solver/scene/fill.hpp>
