@@ -28,7 +28,7 @@ def errors_table(study):
         if p["choice"]:
             continue
         if p["exit_code"] != 0:
-            out.append(f"| {p['curve']} | {p.get('spacing', 0):g} | {p.get('message', 'not run')[:80]} |" + " |" * (3 + len(measures)))
+            out.append(f"| {p['curve']} | {p.get('spacing', 0):g} | {p.get('message', '')[:80] if p['exit_code'] > 0 else 'not run'} |" + " |" * (3 + len(measures)))
             continue
         cells = [percent(p["errors"][m]) for m in measures]
         out.append(f"| {p['curve']} | {p['spacing']:g} | {p['particles']} | {p['steps']} | {p['work']:.3g} | {p['core_seconds']:.1f} | " + " | ".join(cells) + " |")
