@@ -23,15 +23,15 @@ def percent(x, signed=False):
 
 def errors_table(study):
     measures = list(study["measures"])
-    out = ["| settings | spacing (m) | particles | steps | pairs | core-seconds | " + " | ".join(measures) + " |", "|---" * (6 + len(measures)) + "|"]
+    out = ["| settings | spacing (m) | particles | steps | work | core-seconds | " + " | ".join(measures) + " |", "|---" * (6 + len(measures)) + "|"]
     for p in study["points"]:
         if p["choice"]:
             continue
         if p["exit_code"] != 0:
-            out.append(f"| {p['curve']} | {p.get('spacing', 0):g} | {p.get('message', 'not run')[:80]} |" + " |" * (3 + len(measures)))
+            out.append(f"| {p['curve']} | {p.get('spacing', 0):g} | {p.get('message', '')[:80] if p['exit_code'] > 0 else 'not run'} |" + " |" * (3 + len(measures)))
             continue
         cells = [percent(p["errors"][m]) for m in measures]
-        out.append(f"| {p['curve']} | {p['spacing']:g} | {p['particles']} | {p['steps']} | {p['pairs']:.3g} | {p['core_seconds']:.1f} | " + " | ".join(cells) + " |")
+        out.append(f"| {p['curve']} | {p['spacing']:g} | {p['particles']} | {p['steps']} | {p['work']:.3g} | {p['core_seconds']:.1f} | " + " | ".join(cells) + " |")
     return out
 
 
@@ -41,12 +41,12 @@ def choices_table(study):
         return []
     measures = [m for m in study["measures"] if any(p["against_base"].get(m) is not None for p in rows)]
     base = next(p for p in study["points"] if p["choice"] and p["curve"] == "base")
-    out = [f"Each choice against the base (`standard`, spacing {base['spacing']:g} m, {base['core_seconds']:.1f} core-seconds): time and pairs as ratios, errors as changes.", "",
-           "| choice | time | pairs | " + " | ".join(measures) + " |", "|---" * (3 + len(measures)) + "|",
+    out = [f"Each choice against the base (`standard`, spacing {base['spacing']:g} m, {base['core_seconds']:.1f} core-seconds): time and work as ratios, errors as changes.", "",
+           "| choice | time | work | " + " | ".join(measures) + " |", "|---" * (3 + len(measures)) + "|",
            "| base | 1 | 1 | " + " | ".join(percent(base["errors"][m]) for m in measures) + " |"]
     for p in rows:
         a = p["against_base"]
-        out.append(f"| {p['curve']} | {a['core_seconds']:.2f} | {a['pairs']:.2f} | " + " | ".join(percent(a[m], True) for m in measures) + " |")
+        out.append(f"| {p['curve']} | {a['core_seconds']:.2f} | {a['work']:.2f} | " + " | ".join(percent(a[m], True) for m in measures) + " |")
     return out
 
 

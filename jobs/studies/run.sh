@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The studies of docs/accuracy.md: jobs/studies/run.sh [NAME...] (default: all four, about 20 core-minutes). Finished points are
-# not run again. Results are in results/accuracy; jobs/studies/publish.py results/accuracy writes the page, its figures and the
-# table behind `kuzure check --accuracy` from them.
+# The studies of docs/accuracy.md: jobs/studies/run.sh [NAME...] (default: all four, about 16 core-minutes, half of them the finest runs
+# of the one-pass scheme). Finished points are not run again. Results are in results/accuracy; jobs/studies/publish.py results/accuracy
+# writes the page, its figures and the table behind `kuzure check --accuracy` from them.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source jobs/environment.sh

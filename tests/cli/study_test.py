@@ -94,7 +94,15 @@ class Study(unittest.TestCase):
         base = next(p for p in study["points"] if p["curve"] == "base")
         self.assertEqual(base["folder"], good["folder"])
         mixed = next(p for p in study["points"] if p["curve"] == "mixed")
-        self.assertAlmostEqual(mixed["against_base"]["pairs"], 1.0, places=2)
+        self.assertAlmostEqual(mixed["against_base"]["work"], 1.0, places=2)
+        # Work is in pairs of the one-pass scheme: those of a scheme of two passes weigh more.
+        for p in (points["seed", 0.1], good, mixed):
+            price = p["work"] / p["pairs"]
+            if p["curve"] == "seed":
+                self.assertEqual(price, 1)
+            else:
+                self.assertGreater(price, 1.1)
+                self.assertLess(price, 2)
         self.assertEqual(len((self.dir / "out/study.csv").read_text().splitlines()), 8)
         for curve in study["curves"]:
             self.assertIn("three resolutions", curve["run-out"]["no_extrapolation"])

@@ -2,6 +2,7 @@
 #include "io/scene_file.hpp"
 #include "io/scene_keys.hpp"
 #include "io/sweep_file.hpp"
+#include "solver/app/scaling/estimate.hpp"
 #include "solver/app/study/convergence.hpp"
 #include "solver/app/study/dial.hpp"
 #include "solver/app/study/profile.hpp"
@@ -342,6 +343,30 @@ TEST(Dial, ProposesTheCheapestThatReachesTheError)
     EXPECT_GE(distance(likeness(block(0.1)), read_measured(table_text)[0].about, &why), 1);
     EXPECT_THAT(why, HasSubstr("2-D, not 3-D"));
     EXPECT_THROW(propose(scene, 0.05, {}, cost), BadInput);
+}
+TEST(Dial, AStepIsPricedByThePassesOfItsScheme)
+{
+    // The same soil and the same steps: only what a step does with them differs.
+    const auto estimated = [](scene::Scheme scheme, scene::Precision precision) {
+        Scene s = block(0.1, "", 3);
+        s.time.step = 1e-4;
+        s.accuracy.scheme = scheme, s.accuracy.precision = precision;
+        return estimate(s, scene::Filling(s), *choose_model(s, Arithmetic::Simd));
+    };
+    const auto one = estimated(scene::Scheme::LeapFrog, scene::Precision::Double);
+    const auto two = estimated(scene::Scheme::Staggered, scene::Precision::Double);
+    EXPECT_EQ(one.pairs, two.pairs);
+    EXPECT_EQ(step_price(scene::Scheme::LeapFrog), 1);
+    EXPECT_GT(work(one), one.pairs) << "updates of particles count too";
+    // Twice over the pairs, once over the neighbours' distances: dearer, but not twice as dear.
+    EXPECT_NEAR(work(two) / work(one), step_price(scene::Scheme::Staggered), 1e-12);
+    EXPECT_GT(step_price(scene::Scheme::Staggered), 1.1);
+    EXPECT_LT(step_price(scene::Scheme::Staggered), 2);
+    EXPECT_LT(work(estimated(scene::Scheme::Staggered, scene::Precision::Mixed)), work(two));
+    // What a run is priced at goes with its steps: thirteen times as many of the cheap ones cost more than the dear ones.
+    auto often = one, seldom = two;
+    often.steps *= 13, often.pairs *= 13;
+    EXPECT_GT(work(often), 8 * work(seldom));
 }
 TEST(Dial, TheBuiltInTableHoldsTogether)
 {

@@ -21,12 +21,7 @@ Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy
     const auto estimate_of = [](const scene::CheckedScene& r) {
         return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd));
     };
-    // Counted, not timed, so that the same is proposed at every call; mixed precision took 0.76 of the time (docs/performance.md).
-    const auto work = [&](const scene::CheckedScene& r) {
-        const Estimate e = estimate_of(r);
-        return (e.mixed ? 0.76 : 1) * e.pairs + StepWork::particle * double(e.soil) * double(e.steps);
-    };
-    const auto proposal = study::propose(s, wanted, study::measured(), work);
+    const auto proposal = study::propose(s, wanted, study::measured(), [&](const scene::CheckedScene& r) { return work(estimate_of(r)); });
     const auto& r = *proposal.checked;
     const double seconds = forecast(comm, r.scene, r.filling, estimate_of(r)).seconds;
     if (comm.rank() == 0)

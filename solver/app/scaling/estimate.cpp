@@ -1,6 +1,7 @@
 #include "solver/app/scaling/estimate.hpp"
 #include "io/checkpoint.hpp"
 #include "io/snapshot.hpp"
+#include "solver/run/blocks.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/nearby.hpp"
@@ -86,9 +87,23 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     e.checkpoint = double(io::checkpoint_bytes(e.soil, std::size_t(columns / std::max<double>(1, double(e.soil)))));
     e.history_rows = s.output.history ? times(*s.output.history) + 1 : 1;
     e.history = e.history_rows * 320;
+    e.step_price = step_price(s.accuracy.scheme);
     // A collapse presses the soil together and spreads it: over the runs of docs/performance.md the one outweighs the other.
     e.pairs = double(e.steps) * double(e.soil) * neighbours_at_start(s, f) * 1.03;
     return e;
+}
+
+double step_price(scene::Scheme scheme)
+{
+    // The cube's study, standard against the seed's kernel in one pass (docs/accuracy.md), lists and updates included. By kernel and
+    // size of the run it is 1.1 to 1.9.
+    return scheme == scene::Scheme::Staggered ? 1.4 : 1;
+}
+
+double work(const Estimate& e)
+{
+    const double mixed = 0.76; // time of a pair in mixed precision over that in double (docs/performance.md)
+    return e.step_price * ((e.mixed ? mixed : 1) * e.pairs + StepWork::particle * double(e.soil) * double(e.steps));
 }
 
 double machine_memory()

@@ -19,12 +19,13 @@ struct Estimate {
     double snapshots;  // how many
     double history;    // bytes
     double history_rows;
-    double pairs;   // directed pairs of all steps
-    double record;  // bytes of a ghost particle, sent every step
-    double support; // radius in which particles see each other, spacings
-    bool mixed;     // precision of the pair sums
-    double columns; // of the box around all soil, two spacings wide: one rank may hold them all
-    double longest; // side of that box, spacings
+    double pairs;      // directed pairs of all steps, each once a step
+    double step_price; // of a step, in those of the one-pass scheme over the same soil
+    double record;     // bytes of a ghost particle, sent every step
+    double support;    // radius in which particles see each other, spacings
+    bool mixed;        // precision of the pair sums
+    double columns;    // of the box around all soil, two spacings wide: one rank may hold them all
+    double longest;    // side of that box, spacings
 
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
     double disk() const { return snapshots * snapshot + wall_files + 3 * checkpoint + history; }
@@ -32,6 +33,11 @@ struct Estimate {
 /// Neighbours inside the support of one soil particle, walls included: mean over the scene as filled.
 double neighbours_at_start(const Scene&, const scene::Filling&);
 Estimate estimate(const Scene&, const scene::Filling&, const PairModel&);
+
+/// What a step costs in those of the one-pass scheme over the same soil: a staggered step goes over its pairs twice.
+double step_price(scene::Scheme);
+/// The work of all steps in directed pairs of the one-pass scheme in double precision: counted, not timed, so the same at every call.
+double work(const Estimate&);
 
 /// Columns that a run begins with at most; where soil spreads over more, one rank alone could not hold it, so none begins.
 inline constexpr double most_columns = 5e7;

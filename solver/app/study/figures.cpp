@@ -34,7 +34,7 @@ std::string both(const std::string& name, int width, int height, const std::stri
     return out;
 }
 
-/// Error against cost, once by core-seconds and once by pairs.
+/// Error against cost, once by core-seconds and once by work.
 std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
 {
     const auto name = "error_" + file_of(m);
@@ -46,22 +46,22 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
         std::string block;
         for (const Point* p : study.along(curve))
             if (study.tells(*p, m)) {
-                block += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", p->core_seconds, p->pairs, 100 * p->error[k], p->spacing);
+                block += fmt::format("{:.6g} {:.6g} {:.6g} {:.6g}\n", p->core_seconds, p->work, 100 * p->error[k], p->spacing);
                 least = std::min(least, 100 * p->error[k]), most = std::max(most, 100 * p->error[k]);
             }
         if (block.empty()) continue;
-        data += fmt::format("# {}: core-seconds, pairs, error in %, spacing in m\n{}\n\n", io::comment_text(curve), block);
+        data += fmt::format("# {}: core-seconds, work, error in %, spacing in m\n{}\n\n", io::comment_text(curve), block);
         curves.push_back(curve);
     }
     if (curves.empty()) return {};
     std::string fronts[2];
-    for (const bool pairs : {false, true}) {
+    for (const bool work : {false, true}) {
         std::vector<Price> all;
         for (const auto& curve : curves)
-            for (const auto& p : study.prices(curve, m, pairs)) all.push_back(p);
-        fronts[pairs] = "# Pareto front: cost, error in %\n";
-        for (const auto i : pareto_front(all)) fronts[pairs] += fmt::format("{:.6g} {:.6g}\n", all[i].cost, 100 * all[i].error);
-        data += fronts[pairs] + "\n\n";
+            for (const auto& p : study.prices(curve, m, work)) all.push_back(p);
+        fronts[work] = "# Pareto front: cost, error in %\n";
+        for (const auto i : pareto_front(all)) fronts[work] += fmt::format("{:.6g} {:.6g}\n", all[i].cost, 100 * all[i].error);
+        data += fronts[work] + "\n\n";
     }
     io::write_atomically(folder / (name + ".dat"), data);
 
@@ -71,28 +71,28 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
                     io::gnuplot_string(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
                     0.5 * std::min(least, 1.0), 2 * std::max(most, 5.0));
     const double scatter = 100 * study.sweep.reference.scatter;
-    for (const bool pairs : {false, true}) {
-        c += fmt::format("set xlabel '{}'\n", pairs ? "pair interactions" : "core-seconds");
-        c += pairs ? "unset key\n" : "set key at graph 0,-0.17 left top Left reverse samplen 1.5 spacing 1.1 font ',9' maxcols 1\n";
-        if (!pairs) c += "set format x '%g'\n";
+    for (const bool work : {false, true}) {
+        c += fmt::format("set xlabel '{}'\n", work ? "work (pairs of the one-pass scheme)" : "core-seconds");
+        c += work ? "unset key\n" : "set key at graph 0,-0.17 left top Left reverse samplen 1.5 spacing 1.1 font ',9' maxcols 1\n";
+        if (!work) c += "set format x '%g'\n";
         else c += "set format x '%.0e'\n";
         std::string plots;
         const auto add = [&](const std::string& one) { plots += (plots.empty() ? "plot " : ", \\\n  ") + one; };
         if (scatter > 0) add(fmt::format("{:.4g} w filledcurves y1=1e-9 fc rgb '#eeeeee' t 'scatter of the experiment'", scatter));
-        add(fmt::format("'{}.dat' index {} u 1:2 w l lw 7 lc rgb '#ffe08a' t 'Pareto front'", name, curves.size() + std::size_t(pairs)));
+        add(fmt::format("'{}.dat' index {} u 1:2 w l lw 7 lc rgb '#ffe08a' t 'Pareto front'", name, curves.size() + std::size_t(work)));
         add("5 w l dt 3 lc rgb '#999999' notitle"), add("1 w l dt 3 lc rgb '#999999' notitle");
         std::string labels;
         for (std::size_t i = 0; i < curves.size(); ++i) {
             std::string title = curves[i];
-            if (!pairs)
+            if (!work)
                 for (const auto& [level, text] : {std::pair{0.05, "5 %"}, std::pair{0.01, "1 %"}})
                     if (const auto t = cost_at(study.prices(curves[i], m, false), level))
                         title += fmt::format(", {} in {:.3g} s", text, *t);
-            add(fmt::format("'{}.dat' index {} u {}:3 w lp lw 2 pt 7 ps 0.8 lc rgb '{}' t {}", name, i, pairs ? 2 : 1, colours[i % 8],
+            add(fmt::format("'{}.dat' index {} u {}:3 w lp lw 2 pt 7 ps 0.8 lc rgb '{}' t {}", name, i, work ? 2 : 1, colours[i % 8],
                             io::gnuplot_string(title)));
         }
         add(fmt::format("'{}.dat' index 0 u {}:3:(sprintf('%g m', $4)) w labels offset 0,0.8 font ',8' textcolor rgb '#404040' notitle",
-                        name, pairs ? 2 : 1));
+                        name, work ? 2 : 1));
         c += plots + "\n";
     }
     c += "unset multiplot\n";
@@ -105,7 +105,7 @@ std::string choice_figure(const Study& study, const io::Path& folder)
     const Point* base = study.base();
     if (!base) return {};
     const auto m = study.sweep.measures.front();
-    std::string data = "# choice, core-seconds over the base's, pairs over the base's, change of the error in percent points\n";
+    std::string data = "# choice, core-seconds over the base's, work over the base's, change of the error in percent points\n";
     int rows = 0;
     double greatest = 1, largest = 0.1;
     for (const auto& p : study.points) {
@@ -114,7 +114,7 @@ std::string choice_figure(const Study& study, const io::Path& folder)
         const double time = p.core_seconds / base->core_seconds;
         std::string name = io::comment_text(p.asked.curve); // in a table of gnuplot, where a double quote ends it
         std::replace(name.begin(), name.end(), '"', '\'');
-        data += fmt::format("\"{}\" {:.5g} {:.5g} {:.5g}\n", name, time, p.pairs / base->pairs, std::isfinite(change) ? change : 0.0);
+        data += fmt::format("\"{}\" {:.5g} {:.5g} {:.5g}\n", name, time, p.work / base->work, std::isfinite(change) ? change : 0.0);
         greatest = std::max(greatest, time), largest = std::max(largest, std::fabs(std::isfinite(change) ? change : 0.0)), ++rows;
     }
     if (!rows) return {};

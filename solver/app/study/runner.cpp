@@ -64,12 +64,12 @@ public:
             if (!p.scene) continue;
             if (!take_what_is_there(folder(p), p)) todo.push_back(&p);
         }
-        std::stable_sort(todo.begin(), todo.end(), [](const auto* a, const auto* b) { return a->predicted_pairs < b->predicted_pairs; });
+        std::stable_sort(todo.begin(), todo.end(), [](const auto* a, const auto* b) { return a->predicted_work < b->predicted_work; });
         const auto done = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return p.resumed; });
         say(fmt::format("{}: {} points, {} already there, {} to run, {} thread{} each", study_.sweep.title, study_.points.size(), done,
                         todo.size(), threads, threads > 1 ? "s" : ""));
-        double pairs_left = 0, pairs_done = 0, seconds_done = 0;
-        for (const auto* p : todo) pairs_left += p->predicted_pairs;
+        double work_left = 0, work_done = 0, seconds_done = 0;
+        for (const auto* p : todo) work_left += p->predicted_work;
         const auto begin = std::chrono::steady_clock::now();
         for (std::size_t k = 0; k < todo.size(); ++k) {
             Point& p = *todo[k];
@@ -85,8 +85,8 @@ public:
                 say("stopped on request; the same command goes on from here");
                 return Exit::Stopped;
             } else {
-                pairs_done += p.predicted_pairs, seconds_done += p.core_seconds;
-                const double left = pairs_done > 0 ? seconds_done / pairs_done * (pairs_left - p.predicted_pairs) / threads : 0;
+                work_done += p.predicted_work, seconds_done += p.core_seconds;
+                const double left = work_done > 0 ? seconds_done / work_done * (work_left - p.predicted_work) / threads : 0;
                 say(fmt::format("{}: {}{}", head,
                                 p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds)
                                                  : fmt::format("exit {}: {}", p.exit_code, p.message),
@@ -94,7 +94,7 @@ public:
                                                                  : fmt::format("; about {:.1f} minutes left", left / 60)
                                                     : ""));
             }
-            pairs_left -= p.predicted_pairs;
+            work_left -= p.predicted_work;
         }
 
         for (auto& p : study_.points) {

@@ -107,11 +107,11 @@ bool Study::tells(const Point& p, Measure m) const
     return std::isfinite(error) && error > 0 && p.spacing > reference_spacing[std::size_t(m)] * (1 + 1e-9);
 }
 
-std::vector<Price> Study::prices(const std::string& curve, Measure m, bool pairs) const
+std::vector<Price> Study::prices(const std::string& curve, Measure m, bool work) const
 {
     std::vector<Price> all;
     for (const Point* p : along(curve))
-        if (tells(*p, m)) all.push_back({pairs ? p->pairs : p->core_seconds, p->error[std::size_t(m)]});
+        if (tells(*p, m)) all.push_back({work ? p->work : p->core_seconds, p->error[std::size_t(m)]});
     return all;
 }
 const Point* Study::base() const
@@ -142,7 +142,7 @@ Study plan(const io::Sweep& sweep)
             Scene s = io::parse_scene(text, sweep.scene.string(), asked.sets);
             p.spacing = s.space.spacing;
             const scene::Filling filling(s);
-            p.predicted_pairs = estimate(s, filling, *choose_model(s, Arithmetic::Simd)).pairs;
+            p.predicted_work = work(estimate(s, filling, *choose_model(s, Arithmetic::Simd)));
             for (const auto& n : scene::dimensionless_numbers(s, filling)) {
                 if (n.name == "base_strain") p.base_strain = n.value;
                 if (n.name == "mach") p.mach = n.value;
@@ -174,6 +174,7 @@ void measure(const Study& study, Point& p, const io::Path& run)
     const auto summary = nlohmann::json::parse(io::read_text(run / "summary.json"));
     p.particles = summary.at("soil_particles"), p.steps = summary.at("steps");
     p.pairs = summary.at("pairs").get<double>(), p.wall_seconds = summary.at("wall_seconds");
+    p.work = p.pairs * step_price(p.scene->accuracy.scheme);
     const auto history = report::read_table(io::read_text(run / "history.csv"));
     const auto& residual = history.at("residual");
     if (residual.empty()) throw std::out_of_range("history.csv has no rows");
@@ -354,6 +355,7 @@ nlohmann::ordered_json to_json(const Study& study)
             row.update(Json{{"particles", p.particles},
                             {"steps", p.steps},
                             {"pairs", p.pairs},
+                            {"work", p.work},
                             {"core_seconds", p.core_seconds},
                             {"wall_seconds", p.wall_seconds}});
             row["values"] = Json::object(), row["errors"] = Json::object();
@@ -362,7 +364,7 @@ nlohmann::ordered_json to_json(const Study& study)
                 row["errors"][names[std::size_t(m)]] = p.error[std::size_t(m)];
             }
             if (base && p.asked.choice && &p != base) {
-                row["against_base"] = {{"core_seconds", p.core_seconds / base->core_seconds}, {"pairs", p.pairs / base->pairs}};
+                row["against_base"] = {{"core_seconds", p.core_seconds / base->core_seconds}, {"work", p.work / base->work}};
                 for (const auto m : study.sweep.measures)
                     row["against_base"][names[std::size_t(m)]] = p.error[std::size_t(m)] - base->error[std::size_t(m)];
             }
@@ -416,7 +418,7 @@ nlohmann::ordered_json to_json(const Study& study)
 
 std::string to_csv(const Study& study)
 {
-    std::string out = "curve,choice,spacing,particles,steps,pairs,core_seconds,wall_seconds,exit_code,base_strain,mach";
+    std::string out = "curve,choice,spacing,particles,steps,pairs,work,core_seconds,wall_seconds,exit_code,base_strain,mach";
     for (const auto m : study.sweep.measures) {
         std::string name = io::measure_names()[std::size_t(m)];
         std::replace(name.begin(), name.end(), ' ', '_'), std::replace(name.begin(), name.end(), '-', '_');
@@ -427,9 +429,9 @@ std::string to_csv(const Study& study)
     for (const auto& p : study.points) {
         std::string curve;
         for (const char c : p.asked.curve) curve += c == '"' ? std::string("\"\"") : std::string(1, c);
-        out += fmt::format("\"{}\",{},{},{},{},{},{},{},{},{},{}", curve, int(p.asked.choice), p.scene ? number(p.spacing) : "",
-                           p.particles, p.steps, number(p.pairs), number(p.core_seconds), number(p.wall_seconds), p.exit_code,
-                           number(p.base_strain), number(p.mach));
+        out += fmt::format("\"{}\",{},{},{},{},{},{},{},{},{},{},{}", curve, int(p.asked.choice), p.scene ? number(p.spacing) : "",
+                           p.particles, p.steps, number(p.pairs), number(p.work), number(p.core_seconds), number(p.wall_seconds),
+                           p.exit_code, number(p.base_strain), number(p.mach));
         for (const auto m : study.sweep.measures)
             out += p.finished() ? "," + number(p.value[std::size_t(m)]) + "," + number(p.error[std::size_t(m)]) : ",,";
         out += "\n";

@@ -17,11 +17,12 @@ struct Point {
     std::string hash, folder, message; // the folder goes by the scene: points of one scene are run once, whatever they are called
     int exit_code = -1;                // as kuzure run gave it; -1: not run yet
     bool resumed = false;
-    double spacing = 0; // m
-    double predicted_pairs = 0;
+    double spacing = 0;        // m
+    double predicted_work = 0; // in directed pairs of the one-pass scheme
     // of a finished run
     std::int64_t particles = 0, steps = 0;
     double pairs = 0, core_seconds = 0, wall_seconds = 0;
+    double work = 0; // pairs at the price of the scheme's step, in those of the one-pass scheme
     double base_strain = 0, mach = 0;
     double settlement = 0; // m, of the closed form
     Profile profile;
@@ -65,8 +66,8 @@ struct Study {
     /// True if a point's error is there and says how far it is from the truth: at the spacing of the run that errors count from it
     /// says how near the settings are to each other.
     bool tells(const Point&, io::Measure) const;
-    /// Costs (core-seconds or pairs) and errors of a curve.
-    std::vector<Price> prices(const std::string& curve, io::Measure, bool pairs) const;
+    /// Costs (core-seconds or work) and errors of a curve.
+    std::vector<Price> prices(const std::string& curve, io::Measure, bool work) const;
     const Point* base() const;
 };
 
