@@ -472,7 +472,7 @@ double courant_limit(const Scene& scene)
     return scene.accuracy.correction == Correction::Gradient ? 0.85 * limit : limit;
 }
 double unstable_courant(const Scene& scene) { return scene.accuracy.scheme == Scheme::LeapFrog ? 0.6 : 0.93 * courant_limit(scene); }
-double recommended_courant(const Scene& scene) { return scene.accuracy.scheme == Scheme::LeapFrog ? 0.3 : 0.78 * courant_limit(scene); }
+double recommended_courant(const Scene& scene) { return scene.accuracy.scheme == Scheme::LeapFrog ? 0.3 : 0.8 * courant_limit(scene); }
 double recommended_step(const Scene& scene) { return recommended_courant(scene) * crossing_time(scene); }
 std::int64_t sleep_interval(const Scene& scene)
 {

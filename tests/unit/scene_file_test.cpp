@@ -12,6 +12,7 @@
 #include <numbers>
 #include <regex>
 #include <set>
+#include <sstream>
 
 using namespace kuzure;
 namespace fs = std::filesystem;
@@ -194,6 +195,22 @@ TEST(SceneFile, EveryJobIsReadWithoutAWarning)
             for (const auto& issue : scene::check(scene))
                 if (!large || (issue.key != "base_strain" && issue.key != "mach"))
                     ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
+        }
+}
+
+// What kuzure itself recommends it must not warn of: every preset, in the kernel and step that it sets, in 3-D and 2-D.
+TEST(SceneFile, NoPresetIsWarnedOfItsStep)
+{
+    std::string text;
+    std::istringstream lines(text_of(source / "jobs/scenes/quickstart.toml"));
+    for (std::string line; std::getline(lines, line);)
+        if (!line.starts_with("step ") && !line.starts_with("kernel ")) text += line + "\n";
+    for (const auto& preset : io::presets())
+        for (const char* dimensions : {"dimensions=3", "dimensions=2"}) {
+            const std::vector<std::string> sets{"accuracy.preset=" + preset.name, dimensions};
+            const auto scene = io::parse_scene(text, "quickstart", sets);
+            ASSERT_FALSE(scene.time.step.has_value());
+            for (const auto& issue : scene::check(scene)) EXPECT_NE(issue.key, "accuracy.cfl") << preset.name << ": " << issue.text;
         }
 }
 
