@@ -96,7 +96,9 @@ State state_of(const Cloud& c)
 {
     const auto& p = c.particles;
     const double support2 = c.scene.support() * c.scene.support();
-    State state{1e3 / steps(c).dt, 1e-5 * c.scene.space.spacing, std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
+    // A model may hold more terms than its scene asks for: without diffusion there is no rate of it.
+    State state{c.scene.effects.stress_diffusion ? 1e3 / steps(c).dt : 0, 1e-5 * c.scene.space.spacing,
+                std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
     for (Index i = 0; i < p.size(); ++i)
         for (const auto& w : c.walls)
             for (std::size_t k = 0; k < w.x.size(); ++k) {
