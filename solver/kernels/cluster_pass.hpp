@@ -169,6 +169,33 @@ protected:
         }
         return {pruned.entries, std::size_t(pruned.n)};
     }
+    /// Lengths of the pair loops, in every lane: the support and its square; (0.01 h^2) and what stands for r^2 where two coincide.
+    struct Lengths {
+        V support, support2, softening, tiny;
+    };
+    KUZURE_INLINE Lengths lengths() const
+    {
+        const double h = model_.kernel.h;
+        return {V(T(2 * h)), V(T(4 * h * h)), V(T(0.01 * h * h)), V(T(1e-12 * h * h))};
+    }
+    /// True if one of the cluster's particles is in tension; only of models with artificial stress.
+    KUZURE_INLINE static bool in_tension(const Cluster<V>& i, const Array<Tension<T>>& tension)
+    {
+        bool any = false;
+        if constexpr (M::tensile)
+            for (int l = 0; l < i.count; ++l) any = any || tension[i.first + l].any != 0;
+        return any;
+    }
+    /// body() for every batch of the list, which `batch` then is.
+    template <class Body> KUZURE_INLINE static void for_each_batch(std::span<const Index> near, Batch<V>& batch, Body body)
+    {
+        const int n = int(near.size());
+        for (int b = 0; b < n; b += batch.capacity) {
+            batch.neighbour = &near[b];
+            batch.size = std::min(batch.capacity, n - b);
+            body();
+        }
+    }
     /// How many of the lanes' counts (one a lane) belong to particles that moved.
     static std::int64_t counted(const Cluster<V>& i, V inside)
     {

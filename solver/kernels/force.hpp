@@ -16,17 +16,14 @@ protected:
     using typename Below::T, typename Below::U;
 
     /// What walls add to the sums of a cluster; over wall points j of volume 1, f_ij the mirror factor.
-    struct WallForce {
-        template <class S> struct Sums {
-            Vec3<S> held, pressing; // sum f P (sigma_i grad W); of Coulomb faces apart
-            S limit;                // sum f tan(delta) n.(sigma_i grad W)
-            S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
-            S area;                 // sum f n.grad W of Coulomb faces
-        };
+    template <class S> struct ForceWalls {
+        Vec3<S> held, pressing; // sum f P (sigma_i grad W); of Coulomb faces apart
+        S limit;                // sum f tan(delta) n.(sigma_i grad W)
+        S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
+        S area;                 // sum f n.grad W of Coulomb faces
     };
     template <class S>
     using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
-    template <class S> using ForceWalls = WallForce::template Sums<S>;
     using Lane = Row<W>;
 
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
@@ -71,43 +68,38 @@ private:
     {
         const Kinematics<T>* neighbours = kinematics_.data();
         const Stresses<T>* records = stresses_.data();
-        const V support(T(2 * model_.kernel.h)), support2(T(4 * model_.kernel.h * model_.kernel.h));
-        const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
+        const auto [support, support2, softening, tiny] = Below::lengths();
         const V zero(T(0)), one(T(1));
-        bool tension = false; // one of the cluster's particles is in tension
-        if constexpr (M::tensile)
-            for (int l = 0; l < i.count; ++l) tension = tension || tension_[i.first + l].any != 0;
+        const bool tension = Below::in_tension(i, tension_);
         Batch<V> batch;
         ForceSums<V> sums{};
         V inside = zero;
-        const int n = int(near.size());
-        for (int b = 0; b < n; b += batch.capacity) {
-            batch.neighbour = &near[b];
-            batch.size = std::min(batch.capacity, n - b);
-            for (int k = 0; k < batch.size; ++k) {
-                const Index number = batch.neighbour[k];
-                Entry<V>& e = batch.at[k];
-                const Vec3<V> r = i.position.minus(neighbours[number]);
-                const V r2 = max(dot(r, r), tiny);
-                inside = inside + select(less(r2, support2), one, zero);
-                const auto inv = root<M::Kernel::divides>(r2);
-                const V t = max(support - inv.root, zero);
-                const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * records[number].volume;
-                e.grad = w * r;
-                if constexpr (M::tensile) e.w = model_.kernel.value(t);
-                if constexpr (M::diffusive) {
-                    e.q = w * (r2 / (r2 + softening));
-                    const Vector g = model_.stress_diffusion.gravity;
-                    e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+        Below::for_each_batch(
+            near, batch, [&]() __attribute__((always_inline)) {
+                for (int k = 0; k < batch.size; ++k) {
+                    const Index number = batch.neighbour[k];
+                    Entry<V>& e = batch.at[k];
+                    const Vec3<V> r = i.position.minus(neighbours[number]);
+                    const V r2 = max(dot(r, r), tiny);
+                    inside = inside + select(less(r2, support2), one, zero);
+                    const auto inv = root<M::Kernel::divides>(r2);
+                    const V t = max(support - inv.root, zero);
+                    const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * records[number].volume;
+                    e.grad = w * r;
+                    if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                    if constexpr (M::diffusive) {
+                        e.q = w * (r2 / (r2 + softening));
+                        const Vector g = model_.stress_diffusion.gravity;
+                        e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+                    }
                 }
-            }
-            // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
-            StressForce{}.add(
-                sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
-            if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
-            if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
-            std::apply([&](const auto&... term) { (term.add(sums, batch, records), ...); }, model_.more);
-        }
+                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
+                StressForce{}.add(
+                    sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
+                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+                if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
+                std::apply([&](const auto&... term) { (term.add(sums, batch, records), ...); }, model_.more);
+            });
         widen<V>(sums, out);
         return Below::counted(i, inside);
     }
@@ -128,7 +120,7 @@ private:
         const V none(T(0));
         Below::for_each_wall_pair(i, runs, {none, none, none}, [&](Vec3<V> r, V r2, unsigned hits, const Mirror<V>& m) {
             pairs += std::popcount(hits & i.moving);
-            const V support(T(2 * model_.kernel.h)), zero(T(0));
+            const V support = Below::lengths().support, zero(T(0));
             const auto inv = root<M::Kernel::divides>(r2);
             const Vec3<V> g = (m.factor * model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root)) * r;
             const Vec3<V> traction = sigma * g;

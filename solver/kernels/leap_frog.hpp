@@ -156,59 +156,54 @@ private:
     KUZURE_INLINE std::int64_t sum_over_soil(const Cluster<V>& i, std::span<const Index> near, Rows& out) const
     {
         const Record<T>* records = now_.data();
-        const V support(T(2 * model_.kernel.h)), support2(T(4 * model_.kernel.h * model_.kernel.h));
-        const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
+        const auto [support, support2, softening, tiny] = Base::lengths();
         const V zero(T(0)), one(T(1));
-        bool tension = false; // one of the cluster's particles is in tension
-        if constexpr (M::tensile)
-            for (int l = 0; l < i.count; ++l) tension = tension || tension_[i.first + l].any != 0;
+        const bool tension = Base::in_tension(i, tension_);
         Batch<V> batch;
         Sums<V> sums{};
         V inside = zero;
-        const int n = int(near.size());
-        for (int b = 0; b < n; b += batch.capacity) {
-            batch.neighbour = &near[b];
-            batch.size = std::min(batch.capacity, n - b);
-            // ---- geometry: gradient of W, approach, viscosity
-            for (int k = 0; k < batch.size; ++k) {
-                const Record<T>& j = records[batch.neighbour[k]];
-                Entry<V>& e = batch.at[k];
-                const Vec3<V> r = i.position.minus(j);
-                const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
-                const V r2 = max(dot(r, r), tiny);
-                inside = inside + select(less(r2, support2), one, zero);
-                const V rho_sum = i.rho + j.density;
-                const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
-                const V t = max(support - inv.root, zero);
-                const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume;
-                e.grad = w * r;
-                e.v = v;
-                if constexpr (M::viscous) {
-                    // rho_i rho_j Pi > 0 where the two approach
-                    const V approach = max(dot(v, r), zero);
-                    const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.c_p)};
-                    e.rho2_Pi = model_.viscosity(pair);
-                    sums.viscous_power = fma(e.rho2_Pi * w, approach, sums.viscous_power);
+        Base::for_each_batch(
+            near, batch, [&]() __attribute__((always_inline)) {
+                // ---- geometry: gradient of W, approach, viscosity
+                for (int k = 0; k < batch.size; ++k) {
+                    const Record<T>& j = records[batch.neighbour[k]];
+                    Entry<V>& e = batch.at[k];
+                    const Vec3<V> r = i.position.minus(j);
+                    const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+                    const V r2 = max(dot(r, r), tiny);
+                    inside = inside + select(less(r2, support2), one, zero);
+                    const V rho_sum = i.rho + j.density;
+                    const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+                    const V t = max(support - inv.root, zero);
+                    const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume;
+                    e.grad = w * r;
+                    e.v = v;
+                    if constexpr (M::viscous) {
+                        // rho_i rho_j Pi > 0 where the two approach
+                        const V approach = max(dot(v, r), zero);
+                        const Pair<V> pair{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, V(j.c_p)};
+                        e.rho2_Pi = model_.viscosity(pair);
+                        sums.viscous_power = fma(e.rho2_Pi * w, approach, sums.viscous_power);
+                    }
+                    if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                    if constexpr (M::diffusive) {
+                        e.q = w * (r2 * (inv.inverse * rho_sum));
+                        const Vector g = model_.stress_diffusion.gravity;
+                        e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
+                    }
+                    if constexpr (M::corrected) e.r = r;
                 }
-                if constexpr (M::tensile) e.w = model_.kernel.value(t);
-                if constexpr (M::diffusive) {
-                    e.q = w * (r2 * (inv.inverse * rho_sum));
-                    const Vector g = model_.stress_diffusion.gravity;
-                    e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
-                }
-                if constexpr (M::corrected) e.r = r;
-            }
-            VelocityGradient{}.add(sums, batch);
-            // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j - rho_i rho_j Pi + f^n (tau_i + tau_j) ] . grad W
-            StressForce{}.add(
-                sums, batch, records, [](Sym3<V> s, const Entry<V>& e) __attribute__((always_inline)) {
-                    if constexpr (M::viscous) return plus_isotropic(s, -e.rho2_Pi);
-                    else return s;
-                });
-            if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
-            if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
-            if constexpr (M::corrected) model_.correction.add(sums, batch);
-        }
+                VelocityGradient{}.add(sums, batch);
+                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j - rho_i rho_j Pi + f^n (tau_i + tau_j) ] . grad W
+                StressForce{}.add(
+                    sums, batch, records, [](Sym3<V> s, const Entry<V>& e) __attribute__((always_inline)) {
+                        if constexpr (M::viscous) return plus_isotropic(s, -e.rho2_Pi);
+                        else return s;
+                    });
+                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+                if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
+                if constexpr (M::corrected) model_.correction.add(sums, batch);
+            });
         widen<V>(sums, out);
         return Base::counted(i, inside);
     }
@@ -221,8 +216,8 @@ private:
         const auto x = p[field::position], v = p[field::velocity];
         const auto sigma = p[field::stress];
         const Mirrored law;
-        const V support(T(2 * model_.kernel.h)), support2(T(4 * model_.kernel.h * model_.kernel.h));
-        const V softening(T(0.01 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h)), zero(T(0));
+        const auto [support, support2, softening, tiny] = Base::lengths();
+        const V zero(T(0));
         std::int64_t pairs = 0;
         while (!runs.empty()) {
             const Index number = runs[0];

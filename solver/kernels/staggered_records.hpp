@@ -174,7 +174,7 @@ protected:
     template <class Visit>
     KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, std::span<const Index> runs, Vec3<V> back, Visit visit) const
     {
-        const V support2(T(4 * model_.kernel.h * model_.kernel.h)), tiny(T(1e-12 * model_.kernel.h * model_.kernel.h));
+        const auto [support, support2, softening, tiny] = Base::lengths();
         while (!runs.empty()) {
             const WallRecords<T>& wall = walls_[runs[0]];
             const auto list = runs.subspan(2, runs[1]);

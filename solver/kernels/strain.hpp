@@ -34,15 +34,12 @@ protected:
     using Viscous = std::conditional_t<M::viscous, ViscousForce, NoViscousForce>;
 
     /// What walls add to the sums of a cluster; over wall points j of volume 1, f_ij the mirror factor.
-    struct WallStrain {
-        template <class S> struct Sums {
-            Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
-            Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
-            S walled;                  // not zero for a particle that feels a wall
-        };
+    template <class S> struct StrainWalls {
+        Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
+        Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
+        S walled;                  // not zero for a particle that feels a wall
     };
     template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
-    template <class S> using StrainWalls = WallStrain::template Sums<S>;
     using Lane = Row<W>;
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
@@ -85,37 +82,35 @@ private:
         const Kinematics<T>* records = kinematics_.data();
         const bool one_soil = in.soils.size() == 1;
         const T* speed = one_soil ? nullptr : speed_.data();
-        const V support(T(2 * model_.kernel.h)), softening(T(0.01 * model_.kernel.h * model_.kernel.h));
-        const V tiny(T(1e-12 * model_.kernel.h * model_.kernel.h)), zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
+        const auto [support, support2, softening, tiny] = Below::lengths();
+        const V zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
         Batch<V> batch;
         StrainSums<V> sums{};
-        const int n = int(near.size());
-        for (int b = 0; b < n; b += batch.capacity) {
-            batch.neighbour = &near[b];
-            batch.size = std::min(batch.capacity, n - b);
-            for (int k = 0; k < batch.size; ++k) {
-                const Kinematics<T>& j = records[batch.neighbour[k]];
-                Entry<V>& e = batch.at[k];
-                const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
-                const Vec3<V> r = fma(half_dt, v, i.position.minus(j)); // half a step back
-                const V r2 = max(dot(r, r), tiny);
-                const V rho_sum = i.rho + j.density;
-                const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
-                const V t = max(support - inv.root, zero);
-                e.grad = (model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume) * r;
-                e.v = v;
-                if constexpr (M::viscous) {
-                    // rho_i rho_j Pi > 0 where the two approach
-                    const V approach = max(dot(v, r), zero);
-                    const V c = one_soil ? i.c : V(speed[batch.neighbour[k]]);
-                    e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
+        Below::for_each_batch(
+            near, batch, [&]() __attribute__((always_inline)) {
+                for (int k = 0; k < batch.size; ++k) {
+                    const Kinematics<T>& j = records[batch.neighbour[k]];
+                    Entry<V>& e = batch.at[k];
+                    const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
+                    const Vec3<V> r = fma(half_dt, v, i.position.minus(j)); // half a step back
+                    const V r2 = max(dot(r, r), tiny);
+                    const V rho_sum = i.rho + j.density;
+                    const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
+                    const V t = max(support - inv.root, zero);
+                    e.grad = (model_.kernel.F(t, inv.root, inv.inverse_root) * j.volume) * r;
+                    e.v = v;
+                    if constexpr (M::viscous) {
+                        // rho_i rho_j Pi > 0 where the two approach
+                        const V approach = max(dot(v, r), zero);
+                        const V c = one_soil ? i.c : V(speed[batch.neighbour[k]]);
+                        e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
+                    }
+                    if constexpr (M::corrected) e.r = r;
                 }
-                if constexpr (M::corrected) e.r = r;
-            }
-            VelocityGradient{}.add(sums, batch);
-            Viscous{}.add(sums, batch);
-            if constexpr (M::corrected) model_.correction.add(sums, batch);
-        }
+                VelocityGradient{}.add(sums, batch);
+                Viscous{}.add(sums, batch);
+                if constexpr (M::corrected) model_.correction.add(sums, batch);
+            });
         widen<V>(sums, out);
     }
 
@@ -126,7 +121,8 @@ private:
         const Vec3<V> back{half_dt * i.v.x, half_dt * i.v.y, half_dt * i.v.z};
         StrainWalls<V> sums{};
         Below::for_each_wall_pair(i, runs, back, [&](Vec3<V> r, V r2, unsigned, const Mirror<V>& m) {
-            const V support(T(2 * model_.kernel.h)), softening(T(0.01 * model_.kernel.h * model_.kernel.h)), zero(T(0));
+            const auto [support, support2, softening, tiny] = Below::lengths();
+            const V zero(T(0));
             const V rho_sum = i.rho + i.rho;
             const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
             const Vec3<V> g = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
