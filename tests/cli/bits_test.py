@@ -2,16 +2,11 @@
 """The law of equal bits, through the program: any ranks x threads, any restart, the same state_hash and history.csv."""
 import json, os, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program
+
 here = os.path.dirname(os.path.abspath(__file__))
 work = tempfile.mkdtemp(prefix="kuzure-bits-")
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def run(scene, out, ranks=1, threads=1, extra=(), expect=0):
@@ -123,5 +118,4 @@ try:
     check(changed["state_hash"] != one["state_hash"], "another step gives other bits")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(1 if failures else 0)
+finish()

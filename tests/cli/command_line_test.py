@@ -3,17 +3,11 @@
 progress where it belongs, and what check and a run say of a scene. Run as command_line_test.py PROGRAM."""
 import json, os, pty, re, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
-root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program
+
 work = tempfile.mkdtemp(prefix="kuzure-door-")
-failures = []
 os.environ["OMP_NUM_THREADS"] = "1"
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def call(*args, expect=0, launcher=(), says=(), silent_of=(), **env):
@@ -205,5 +199,4 @@ try:
     check(not os.path.exists(work + "/huge"), "threads that no machine has are refused before anything is written")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

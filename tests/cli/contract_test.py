@@ -5,16 +5,10 @@ import csv, glob, json, os, shutil, signal, subprocess, sys, tempfile, time
 import h5py
 import numpy as np
 
-program = os.path.abspath(sys.argv[1])
-root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, root
+
 work = tempfile.mkdtemp(prefix="kuzure-contract-")
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def call(*args, expect=0, **kw):
@@ -190,5 +184,4 @@ try:
     check(rows == ["0", "0.001"], f"without output.history the first and the last row are written, found {rows}")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(1 if failures else 0)
+finish()

@@ -3,8 +3,9 @@
 on any number of ranks before anything is written, and memory stays what kuzure check says."""
 import json, os, resource, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
-failures = []
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program
+
 SCENE = """title = "two small bodies"
 dimensions = 3
 [space]
@@ -27,12 +28,6 @@ box = {{ low = [{x}, {y}, {z}], high = [{x}.16, {y}.16, {z}.16] }}
 [effects]
 gravity = [0.0, 0.0, -9.81]
 """
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def little():  # 4 GB of addresses: a start that would eat the machine ends here
@@ -70,5 +65,4 @@ try:
     check(done.returncode in (0, 2) and (done.returncode == 0) == os.path.exists(work + "/out"), f"a period of 400 km on 2: exit {done.returncode}, a directory only with a run: {done.stderr.strip()[-300:]}")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(1 if failures else 0)
+finish()

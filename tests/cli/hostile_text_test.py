@@ -3,17 +3,11 @@
 names of files, and the batch scripts and figures made of them. Run as hostile_text_test.py PROGRAM."""
 import os, re, shutil, subprocess, sys, tempfile, time
 
-program = os.path.abspath(sys.argv[1])
-root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, root
+
 work = tempfile.mkdtemp(prefix="kuzure-hostile-")
-failures = []
 os.environ.update(OMP_NUM_THREADS="1", KUZURE_MPI="0")
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def call(*args, expect=0, says=(), cwd=work, command=None):
@@ -162,5 +156,4 @@ try:
     call("study", "study.toml", "-o", "broken", expect=2, says=["title", "line break"])
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

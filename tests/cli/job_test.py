@@ -3,16 +3,10 @@
 scripts run through a stand-in of pjsub (tests/cluster/pjsub) go on by themselves until the state is that of an undisturbed run."""
 import glob, json, os, re, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
-root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, root
+
 work = tempfile.mkdtemp(prefix="kuzure job ")  # with a blank: paths must be quoted
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def job(*args, expect=0, says=()):
@@ -281,5 +275,4 @@ done, codes, said = submit("oakforest-pacs", "stopped", ["pjsub"], stopped)
 check(codes == ["5"] and "stopped by the file" in "".join(said), f"a STOP file ends the series: {codes}")
 
 shutil.rmtree(work)
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

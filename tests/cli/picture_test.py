@@ -4,15 +4,10 @@ import glob, json, os, shutil, struct, subprocess, sys, tempfile
 
 import h5py
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, failures, program
+
 work = tempfile.mkdtemp(prefix="kuzure-picture-")
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def call(*args, expect=0, ranks=1):

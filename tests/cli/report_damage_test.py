@@ -3,16 +3,11 @@
 file. Every file of a result directory in turn, each kind of damage. Run as report_damage_test.py PROGRAM."""
 import json, os, random, resource, shutil, subprocess, sys, tempfile, time
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, failures, finish, program
+
 work = tempfile.mkdtemp(prefix="kuzure-damage-")
-failures = []
 os.environ.update(OMP_NUM_THREADS="1", XDG_CACHE_HOME=work + "/cache")
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 SCENE = """title = "a block"
@@ -146,5 +141,4 @@ try:
     check(len(failures) == 0, f"{count} damaged directories")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

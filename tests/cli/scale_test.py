@@ -2,15 +2,10 @@
 """kuzure scale against kuzure run: what is counted for a number of ranks is what that many ranks then do, to the particle."""
 import json, os, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program
+
 work = tempfile.mkdtemp(prefix="kuzure-scale-")
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def call(*command, expect=0):
@@ -158,5 +153,4 @@ try:
         check(words in done.stderr, f"{what}: the message says so: {done.stderr.strip()[:200]}")
 finally:
     shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(1 if failures else 0)
+finish()

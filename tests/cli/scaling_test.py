@@ -2,18 +2,12 @@
 """jobs/scaling.py on a tiny scaling: tables, plots, a split of the losses that adds up, resuming, and points as batch jobs."""
 import csv, glob, json, os, re, shutil, subprocess, sys, tempfile
 
-program = os.path.abspath(sys.argv[1])
-root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, root
+
 work = tempfile.mkdtemp(prefix="kuzure-scaling-")
-failures = []
 env = dict(os.environ, PATH=os.path.join(root, "tests/cluster") + ":" + os.environ["PATH"], OMPI_MCA_rmaps_base_oversubscribe="1", KUZURE_CORES="2",
            OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1")
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def scaling(*args, expect=0, says=""):
@@ -143,5 +137,4 @@ try:
     scaling("strong.toml", "-o", "bad", "--quick", expect=4, says="time.ned")
 finally:
     shutil.rmtree(work)
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

@@ -14,9 +14,10 @@ import time
 import h5py
 import numpy as np
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, failures, program
+
 work = tempfile.mkdtemp(prefix="kuzure-start-")
-failures = []
 
 BANK = """title = "bank"
 dimensions = 2
@@ -54,12 +55,6 @@ GATE = """[[wall]]
 box = { low = [8.0, 0.0, 0.0], high = [9.0, 0.0, 4.0] }
 surface = "smooth"
 """
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def scene(name, dx=0.25, cohesion=1e4, stress=AT_REST, gate=GATE, more=""):

@@ -3,18 +3,13 @@
 dies goes on elsewhere, both with the bits of an undisturbed run. Exit 77 (not run) without root, Slurm or network namespaces."""
 import glob, json, os, re, shutil, subprocess, sys, tempfile, time
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, failures, finish, program
+
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
 work = tempfile.mkdtemp(prefix="kuzure slurm ")
 os.environ.setdefault("KUZURE_CLUSTER", "kzs")
-failures = []
-
-
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def cluster(*args):
@@ -166,5 +161,4 @@ finally:
         shutil.rmtree(work, ignore_errors=True)
     else:
         print(f"left for inspection: {work}")
-print(f"{len(failures)} failures")
-sys.exit(bool(failures))
+finish()

@@ -5,8 +5,9 @@ import csv, json, os, shutil, signal, subprocess, sys, tempfile, time
 import h5py
 import numpy as np
 
-program = os.path.abspath(sys.argv[1])
-failures = []
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program
+
 
 # The law of equal bits lets any run here be compared with any other by its hash.
 SCENE = """title = "a block of wet sand thrown across the floor"
@@ -46,10 +47,6 @@ def scene_text(end=0.02, every=0.005, checkpoint=30.0):
     return SCENE.format(end=end, every=every, checkpoint=checkpoint)
 
 
-def check(good, what):
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    if not good:
-        failures.append(what)
     return good
 
 
@@ -189,6 +186,4 @@ def same_results(place, out, reference, name):
     return good
 
 
-def end():
-    print(f"{len(failures)} failures")
-    sys.exit(1 if failures else 0)
+end = finish
