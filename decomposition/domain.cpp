@@ -1,6 +1,6 @@
 #include "decomposition/domain.hpp"
+#include "solver/core/wall_clock.hpp"
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -11,8 +11,6 @@ namespace {
 
 /// Particles below which threads cost more than they bring.
 constexpr Index parallel = 4096;
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 // ---- bytes of several lists in one message --------------------------------------------------------------------------
 template <class T> void put(std::vector<std::byte>& to, std::span<const T> items)
@@ -50,7 +48,7 @@ int Domain::owner_of(const Block& asked) const
 // ---- cutting --------------------------------------------------------------------------------------------------------
 CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost halo, Labels labels)
 {
-    const double start = now();
+    const double start = wall_clock();
     const auto lists = comm_.gather(std::as_bytes(mine));
     std::vector<std::byte> result;
     if (comm_.rank() == 0) {
@@ -105,7 +103,7 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
     r.pieces = take<int>(from);
 
     is_cut_ = true;
-    r.seconds = comm_.max(now() - start);
+    r.seconds = comm_.max(wall_clock() - start);
     return r;
 }
 

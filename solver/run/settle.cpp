@@ -1,5 +1,6 @@
 #include "solver/run/settle.hpp"
 #include "solver/run/simulation.hpp"
+#include "solver/run/start.hpp"
 #include "solver/scene/at_rest.hpp"
 #include <fmt/format.h>
 #include <limits>
@@ -9,14 +10,12 @@ namespace {
 
 double gravity(const Scene& s) { return length(s.effects.gravity.value_or(Vector{})); }
 
-bool rests(const scene::Body& b) { return b.stress == scene::InitialStress::AtRest; }
-
 /// The scene with nothing but its soil at rest, critically damped in its lowest mode for as long as it takes; strength is that of soil
 /// that has not yet been sheared. `held`: so strong that nothing yields.
 Scene settling_scene(const Scene& scene, double end, bool held)
 {
     Scene s = scene;
-    std::erase_if(s.bodies, [](const scene::Body& b) { return !rests(b); });
+    std::erase_if(s.bodies, [](const scene::Body& b) { return !scene::rests(b); });
     for (auto& b : s.bodies) b.velocity = {};
     for (auto& soil : s.soils) {
         soil.softening.reset(), soil.dilation_decay.reset(), soil.rate_friction.reset();
@@ -36,7 +35,7 @@ public:
         std::int64_t first = 0, own = 0;
         for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
             const std::int64_t n = filling.body_count(int(b));
-            if (rests(scene.bodies[b])) parts_.push_back({own, first - own, int(b)}), own += n;
+            if (scene::rests(scene.bodies[b])) parts_.push_back({own, first - own, int(b)}), own += n;
             first += n;
         }
     }
@@ -66,7 +65,7 @@ double displacement(const Comm& comm, const Particles& p)
 }
 
 /// Runs until the soil rests; false if it moves by more than `most` m, no longer becomes slower, or its time is over. `crossing`:
-/// crossing_time().
+/// time_through_height().
 bool come_to_rest(Simulation& sim, const RunOptions& options, double most, double crossing, Settling& s)
 {
     const double slow = settled_speed(sim.scene()), weak = settled_acceleration(sim.scene());
@@ -102,7 +101,7 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
     double most = scene.space.spacing;
     const double height = filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing;
     for (const auto& b : scene.bodies)
-        if (rests(b)) {
+        if (scene::rests(b)) {
             const auto& soil = scene.soils[std::size_t(b.soil)];
             most = std::max(most, scene.space.spacing + soil.density * gravity(scene) * height * height / soil.young);
         }
@@ -110,7 +109,7 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
     inner.settles = true;
     std::optional<Simulation> sim;
     try {
-        const double crossing = crossing_time(scene, filling), end = 100 * crossing;
+        const double crossing = time_through_height(scene, filling), end = 100 * crossing;
         sim.emplace(comm, settling_scene(scene, end, false), inner);
         s.held = !come_to_rest(*sim, options, most, crossing, s);
         if (s.held) {
@@ -125,9 +124,8 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
     const Ids ids(scene, filling);
     for (Index i = 0; i < p.size(); ++i) {
         const auto found = ids(p[field::id][i]);
-        Vector v = scene.bodies[std::size_t(found.body)].velocity;
-        if (scene.dimensions == 2) v.y = 0;
-        p[field::id].set(i, found.id), p[field::velocity].set(i, v), p[field::plastic_strain].set(i, 0.0);
+        p[field::id].set(i, found.id), p[field::velocity].set(i, start_velocity(scene, scene.bodies[std::size_t(found.body)])),
+            p[field::plastic_strain].set(i, 0.0);
         p[field::origin].set(i, p[field::position][i]), p[field::sorted_position].set(i, p[field::position][i]);
         if (s.held && p.has(field::opened_volume)) p[field::opened_volume].set(i, 0.0);
     }

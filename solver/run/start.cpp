@@ -6,21 +6,24 @@
 namespace kuzure {
 namespace {
 
-bool rests(const scene::Body& b) { return b.stress == scene::InitialStress::AtRest; }
-
 /// Makes slot i of the store the particle of a body as the scene starts it, without stress.
 void place(const Scene& scene, std::span<const Material> soils, Particles& p, Index i, std::int64_t id, Vector x, int body)
 {
     const auto& of = scene.bodies[std::size_t(body)];
-    Vector v = of.velocity;
-    if (scene.dimensions == 2) v.y = 0;
     p[field::position].set(i, x), p[field::origin].set(i, x), p[field::sorted_position].set(i, x);
-    p[field::velocity].set(i, v);
+    p[field::velocity].set(i, start_velocity(scene, of));
     p[field::density].set(i, soils[std::size_t(of.soil)].density);
     p[field::id].set(i, id), p[field::soil].set(i, std::int32_t(of.soil));
 }
 
 } // namespace
+
+Vector start_velocity(const Scene& scene, const scene::Body& body)
+{
+    Vector v = body.velocity;
+    if (scene.dimensions == 2) v.y = 0;
+    return v;
+}
 
 void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scene::Filling& filling, std::span<const Material> soils,
                 Particles& p)
@@ -47,7 +50,7 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
     for (Index i = 0; i < n; ++i) {
         const auto& s = start[i];
         place(scene, soils, p, i, s.id, s.x, s.body);
-        if (rests(scene.bodies[s.body])) p[field::stress].set(i, at_rest(s.x, s.body, scene.bodies[s.body].soil));
+        if (scene::rests(scene.bodies[s.body])) p[field::stress].set(i, at_rest(s.x, s.body, scene.bodies[s.body].soil));
     }
 }
 
@@ -56,7 +59,7 @@ void add_restless(const Comm& comm, const Scene& scene, const scene::Filling& fi
     std::int64_t first = 0;
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const std::int64_t n = filling.body_count(int(b)), r = comm.rank(), ranks = comm.size();
-        if (!rests(scene.bodies[b])) {
+        if (!scene::rests(scene.bodies[b])) {
             const std::int64_t begin = first + n * r / ranks, end = first + n * (r + 1) / ranks;
             const Index at = p.size();
             p.resize(at + Index(end - begin));

@@ -10,6 +10,9 @@ namespace kuzure {
 /// Fills this rank's blocks with the scene's soil, with its velocities and initial stresses. Collective. The fields are required.
 void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
 
+/// Velocity with which a body starts, m/s; none along y in 2-D.
+Vector start_velocity(const Scene&, const scene::Body&);
+
 /// Adds this rank's even share of the bodies that are not "at rest" to soil that is there already.
 void add_restless(const Comm&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
 

@@ -1,4 +1,5 @@
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -175,7 +176,6 @@ struct Bystander {
 
 std::string no_closed_form(const Scene& scene, const Filling& filling)
 {
-    const auto rests = [](const Body& b) { return b.stress == InitialStress::AtRest; };
     if (std::none_of(scene.bodies.begin(), scene.bodies.end(), rests)) return {};
     const Effects& effects = scene.effects;
     if (const auto& g = effects.gravity; !g || g->x != 0 || g->y != 0 || !(g->z < 0)) return "gravity does not point straight down";
@@ -201,19 +201,14 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
     return why;
 }
 
-double crossing_time(const Scene& scene, const Filling& filling)
+double time_through_height(const Scene& scene, const Filling& filling)
 {
     double c = std::numeric_limits<double>::infinity();
     for (const Body& b : scene.bodies)
-        if (b.stress == InitialStress::AtRest) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).c_p);
+        if (rests(b)) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).c_p);
     return (filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing) / c;
 }
 
-double steps_to_settle(const Scene& scene, const Filling& filling)
-{
-    double c = 0;
-    for (const Soil& soil : scene.soils) c = std::max(c, Material::from(soil).c_p);
-    return 8 * crossing_time(scene, filling) / scene.time.step.value_or(scene.accuracy.cfl * scene.smoothing_length() / c);
-}
+double steps_to_settle(const Scene& scene, const Filling& filling) { return 8 * time_through_height(scene, filling) / step_at_rest(scene); }
 
 } // namespace kuzure::scene

@@ -5,6 +5,9 @@
 
 namespace kuzure::scene {
 
+/// True if a body starts with the stress "at rest".
+inline bool rests(const Body& b) { return b.stress == InitialStress::AtRest; }
+
 /// Soil above points of soil, in columns one spacing wide.
 ///
 /// A column carries the stacks of particles (Lattice::Stack) that rest on it, each by the share of the column's width that it covers:
@@ -38,6 +41,6 @@ std::string no_closed_form(const Scene&, const Filling&);
 /// Steps that this settling run is likely to take: a P-wave passes eight times through the height of the soil.
 double steps_to_settle(const Scene&, const Filling&);
 /// Seconds that a P-wave takes through the height of the soil at rest, the slowest of several soils.
-double crossing_time(const Scene&, const Filling&);
+double time_through_height(const Scene&, const Filling&);
 
 } // namespace kuzure::scene

@@ -213,7 +213,7 @@ void check_bodies(const Scene& scene, Rules& rules)
         check_shape(scene, body.shape, key, rules);
         if (flat && body.velocity.y != 0)
             rules.error(key + ".velocity", text("expected no velocity along y in 2-D, found {}; set it to 0", body.velocity.y));
-        if (body.stress == InitialStress::AtRest) {
+        if (rests(body)) {
             const auto& g = scene.effects.gravity;
             if (!g || !(g->z < 0))
                 rules.error(key + ".stress",
@@ -325,7 +325,7 @@ void check_plausible(const Scene& scene, Rules& rules)
     if (const auto& water = effects.pore_pressure; water && (water->density < 500 || water->density > 3000))
         rules.warning("effects.pore_pressure.density", text("{:.6g} kg/m^3 is no water's density: water has 1000", water->density));
 
-    const double step = scene.time.step.value_or(scene.accuracy.cfl * crossing_time(scene)), steps = scene.time.end / step;
+    const double step = step_at_rest(scene), steps = scene.time.end / step;
     if (steps > 1e8)
         rules.warning("time.end", text("{:.3g} s are {:.3g} steps of {:.3g} s: times are in seconds", scene.time.end, steps, step));
     const auto interval = [&](const char* key, const std::optional<double>& every, const char* what) {
@@ -409,6 +409,7 @@ void check_inside(const Scene& scene, Rules& rules)
 
 } // namespace
 
+double step_at_rest(const Scene& scene) { return scene.time.step.value_or(scene.accuracy.cfl * crossing_time(scene)); }
 double crossing_time(const Scene& scene)
 {
     double least = std::numeric_limits<double>::infinity();
@@ -561,8 +562,7 @@ void resolve(Scene& scene)
     const auto fast = list_soils([](const Soil& s) { return s.rate_friction.has_value(); });
     note("rate_friction", !fast.empty(), fast.empty() ? unwritten : "mu(I) in " + fast);
 
-    const auto resting =
-        std::count_if(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) { return b.stress == InitialStress::AtRest; });
+    const auto resting = std::count_if(scene.bodies.begin(), scene.bodies.end(), rests);
     note("stress_at_rest", resting > 0,
          resting ? text("{} of {} bodies start with K0 stress under their own weight", resting, scene.bodies.size())
                  : "every body starts without stress: gravity acts suddenly");

@@ -15,6 +15,8 @@ double recommended_courant(const Scene&);
 
 /// min over soils of h/c_p (s): a Courant number of one.
 double crossing_time(const Scene&);
+/// Length of a step of soil that does not move, s: the fixed one, or accuracy.cfl of crossing_time().
+double step_at_rest(const Scene&);
 /// Fixed steps (s) up to here are stable with margin, and up to there stable at all.
 double recommended_step(const Scene&);
 double stable_step(const Scene&);

@@ -41,7 +41,7 @@ std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
             fmt::format("the soil may move at {:.2f} of its P-wave speed: raise young, or read impacts with care", speed / slowest));
     add("layers", height / dx, "H/spacing, layers of particles over the height; 20 and more for profiles, 50 for stresses", height / dx < 8,
         fmt::format("{:.0f} layers of particles are too few for profiles and stresses; 20 and more are for that", height / dx));
-    const double dt = s.time.step.value_or(s.accuracy.cfl * crossing_time(s));
+    const double dt = step_at_rest(s);
     add("courant", dt / crossing_time(s),
         fmt::format("dt c_p/h, step against the P-wave; recommended up to {:.3g}", recommended_courant(s)), false, {});
     const double slender = height / (0.5 * width);

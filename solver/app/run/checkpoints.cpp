@@ -8,6 +8,14 @@
 
 namespace kuzure {
 
+std::optional<io::Checkpoint> checkpoint_at(const Comm& comm, const io::Path& path)
+{
+    std::error_code error;
+    const bool directory = comm.any(comm.rank() == 0 && std::filesystem::is_directory(path, error));
+    if (directory) return io::newest_good(comm, path, complain);
+    return io::verify_checkpoint(comm, path);
+}
+
 std::string other_writer(const io::Checkpoint& from)
 {
     const auto header = nlohmann::json::parse(from.header, nullptr, false);

@@ -7,6 +7,10 @@
 
 namespace kuzure {
 
+/// Collective: the newest good checkpoint of a result directory, or the checkpoint that a path names; nothing where a directory has none.
+/// Throws IoFailed where it is damaged or not there.
+std::optional<io::Checkpoint> checkpoint_at(const Comm&, const io::Path&);
+
 /// Version, compiler and instruction set of the program that wrote a checkpoint; empty if it was this one.
 std::string other_writer(const io::Checkpoint&);
 /// Collective. Throws BadInput, with the keys that differ, where a checkpoint belongs to another scene.

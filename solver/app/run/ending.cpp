@@ -7,9 +7,9 @@
 #include "solver/app/report/pictures.hpp"
 #include "solver/app/report/report.hpp"
 #include "solver/app/run/fronts.hpp"
-#include "solver/app/run/stop.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/core/simd.hpp"
+#include "solver/core/wall_clock.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 
@@ -44,7 +44,8 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     const Ledger l = sim.ledger();
     const std::int64_t steps_here = sim.steps() - facts_.first_step;
     const double stepping = facts_.loop_seconds;
-    warn_of_volume(sim);
+    const double volume = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
+    warn_of_volume(volume);
     io::Summary s;
     s.wall_seconds = wall_clock() - facts_.start;
     s.status = status, s.exit_code = int(code), s.scene_hash = facts_.scene_hash, s.version = version_text();
@@ -81,7 +82,6 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
         j["settling"] = {{"why", settled->why},        {"steps", settled->steps},        {"seconds", settled->time},
                          {"speed", settled->speed},    {"moved", settled->displacement}, {"held", settled->held},
                          {"at_rest", settled->at_rest}};
-    const double volume = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
     if (volume > 0) j["resting_volume_ratio"] = volume;
     if (outputs.fronts()) j["soil_off_ground"] = outputs.fronts()->off_ground;
     if (facts_.with_twins && code == Exit::Ok) {
@@ -94,12 +94,11 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
 }
 
 /// Without dilation soil keeps its volume: more, where it rests, is not the soil's doing.
-void Ending::warn_of_volume(const Simulation& sim)
+void Ending::warn_of_volume(double ratio)
 {
     constexpr double most = 1.02;
     for (const auto& soil : scene_.soils)
         if (soil.dilation_angle > 0) return;
-    const double ratio = resting_volume_ratio(comm_, sim.particles(), scene_, sim.filling());
     if (ratio > most)
         messages_.warn(fmt::format(
             "the soil at rest takes {:.1f} % more space than at the start, though it does not dilate: heights and reach "

@@ -42,7 +42,7 @@ public:
 
 private:
     void draw_pictures(Simulation&);
-    void warn_of_volume(const Simulation&);
+    void warn_of_volume(double resting_volume_ratio);
     void write_timers(Simulation&);
     void write_report();
 

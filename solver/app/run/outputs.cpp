@@ -1,6 +1,6 @@
 #include "solver/app/run/outputs.hpp"
 #include "io/soil_color.hpp"
-#include "solver/app/run/stop.hpp"
+#include "solver/core/wall_clock.hpp"
 #include <algorithm>
 #include <cmath>
 

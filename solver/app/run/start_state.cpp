@@ -2,6 +2,7 @@
 #include "io/checkpoint.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/cli/command.hpp"
+#include "solver/app/run/checkpoints.hpp"
 #include "solver/app/run/clock_text.hpp"
 #include "solver/app/run/sound_state.hpp"
 #include <filesystem>
@@ -33,13 +34,10 @@ StartState start_state(const Comm& comm, const Scene& scene, const scene::Fillin
         throw BadInput(fmt::format("start.from: {}: {}. Remedy: {}", path.string(), what, remedy));
     };
     std::error_code error;
-    std::int64_t kind = 0;
-    if (comm.rank() == 0) kind = std::filesystem::is_directory(path, error) ? 2 : std::filesystem::is_regular_file(path, error) ? 1 : 0;
-    kind = comm.max(kind);
-    if (kind == 0) refuse("expected the result directory of a run, or a checkpoint; found nothing there", "run that scene first");
-    std::optional<io::Checkpoint> found;
-    if (kind == 2) found = io::newest_good(comm, io::Place(path), complain);
-    else found = io::verify_checkpoint(comm, io::Place(path));
+    const auto there = [&] { return std::filesystem::is_directory(path, error) || std::filesystem::is_regular_file(path, error); };
+    if (!comm.any(comm.rank() == 0 && there()))
+        refuse("expected the result directory of a run, or a checkpoint; found nothing there", "run that scene first");
+    const auto found = checkpoint_at(comm, path);
     if (!found) refuse("expected a checkpoint there, found none", "let that run end, or stop it: both leave one");
 
     std::string differs;

@@ -1,6 +1,6 @@
 #include "solver/app/run/status.hpp"
+#include "solver/core/wall_clock.hpp"
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
@@ -13,8 +13,6 @@
 namespace kuzure {
 
 namespace {
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 std::string duration(double seconds)
 {
     const auto s = std::llround(seconds);
@@ -40,14 +38,14 @@ const std::vector<std::string>& progress_names()
 
 StatusLine::StatusLine(bool speaks, Progress how, double end, double begin, std::int64_t step)
     : speaks_(speaks && how != Progress::None), bar_(how == Progress::Bar || (how == Progress::Auto && own_terminal())), end_(end),
-      start_(now()), last_(start_), time_(begin), step_(step)
+      start_(wall_clock()), last_(start_), time_(begin), step_(step)
 {
 }
 
 bool StatusLine::due(bool final) const
 {
     if (!speaks_) return false;
-    const double t = now();
+    const double t = wall_clock();
     // A log of a long run stays short: every ten seconds at first, every fiftieth of the time gone by later.
     return final || t - last_ >= (bar_ ? 0.5 : std::max(10.0, (t - start_) / 50));
 }
@@ -75,7 +73,7 @@ std::string StatusLine::text(const Status& s, double end, double rate, double le
 
 void StatusLine::show(const Status& s, bool final)
 {
-    const double t = now(), passed = std::max(t - last_, 1e-6);
+    const double t = wall_clock(), passed = std::max(t - last_, 1e-6);
     // The recent pace, remembered for about half a minute.
     const double weight = rate_ > 0 ? 1 - std::exp(-passed / 30) : 1;
     rate_ += weight * (double(s.step - step_) / passed - rate_);

@@ -1,10 +1,7 @@
 #include "solver/app/run/stop.hpp"
 #include "solver/app/cli/signals.hpp"
-#include <chrono>
 
 namespace kuzure {
-
-double wall_clock() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 Requests StopRequests::now()
 {

@@ -2,12 +2,10 @@
 // What asks a run to stop or to keep a checkpoint: signals, the clock, a file STOP, a lost result directory.
 #include "io/result_directory.hpp"
 #include "solver/app/run/arguments.hpp"
+#include "solver/core/wall_clock.hpp"
 #include "solver/run/simulation.hpp"
 
 namespace kuzure {
-
-/// Seconds of a clock that never goes back.
-double wall_clock();
 
 class StopRequests {
 public:

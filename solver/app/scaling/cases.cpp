@@ -31,8 +31,7 @@ template <class Of> std::int64_t most(const CutShare& c, Of of)
 
 State state_of(const Comm& comm, const Scene& s, const io::Path& from)
 {
-    const bool directory = std::filesystem::is_directory(from);
-    const auto found = directory ? io::newest_good(comm, from, complain) : io::verify_checkpoint(comm, from);
+    const auto found = checkpoint_at(comm, from);
     if (!found)
         throw BadInput(fmt::format("--from {}: expected a checkpoint or a result directory that holds one, found none", from.string()));
     require_same_scene(comm, *found, s);
