@@ -102,13 +102,9 @@ double checkerboard(double alpha, const std::string& kernel, double h)
                        const long parity = std::lround(x.x / t.spacing - 0.5) + std::lround(x.z / t.spacing - 0.5);
                        set_velocity(p, i, {parity % 2 ? 1e-3 : -1e-3, 0, 0});
                    }));
-    const auto energy = [&] {
-        const auto l = sim.ledger();
-        return l.state.kinetic + l.state.elastic;
-    };
-    const double start = energy();
+    const double start = mechanical_energy(sim);
     run_to(sim, t.end);
-    return energy() / start;
+    return mechanical_energy(sim) / start;
 }
 
 /// A body of soil that hits a bed at 0.3 c_p.

@@ -112,4 +112,18 @@ inline Cloud cloud(Arrangement kind, Scene s)
     return c;
 }
 
+/// Calls planted(name, change of a scene of everything()) for faults that a comparison with the plain loops has to notice.
+template <class Planted> void plant_faults(Planted planted)
+{
+    planted("kernel", [](Scene& m) { m.accuracy.kernel = scene::Kernel::WendlandC4; });
+    planted("alpha", [](Scene& m) { m.effects.viscosity->alpha *= 1.05; });
+    planted("beta", [](Scene& m) { m.effects.viscosity->beta *= -1; });
+    planted("artificial stress", [](Scene& m) { m.effects.artificial_stress->epsilon *= -1; });
+    planted("its exponent", [](Scene& m) { m.effects.artificial_stress->exponent = 2; });
+    planted("stress diffusion", [](Scene& m) { m.effects.stress_diffusion->zeta *= 1.01; });
+    planted("gradient correction", [](Scene& m) { m.accuracy.correction = scene::Correction::None; });
+    planted("gravity", [](Scene& m) { m.effects.gravity->z *= 1.01; });
+    planted("water table", [](Scene& m) { m.effects.pore_pressure->table[1][1] += 0.01; });
+}
+
 } // namespace kuzure::measured

@@ -427,14 +427,6 @@ TEST(StaggeredByTheBook, NoticesAPlantedFaultInEveryTerm)
             const auto off = difference(c, pass, by_the_book(c, &mistaken));
             EXPECT_GT(std::max(off.largest(), off.rate), 10 * rough) << fault << ", " << dimensions << "-D";
         };
-        planted("kernel", [](Scene& m) { m.accuracy.kernel = scene::Kernel::WendlandC4; });
-        planted("alpha", [](Scene& m) { m.effects.viscosity->alpha *= 1.05; });
-        planted("beta", [](Scene& m) { m.effects.viscosity->beta *= -1; });
-        planted("artificial stress", [](Scene& m) { m.effects.artificial_stress->epsilon *= -1; });
-        planted("its exponent", [](Scene& m) { m.effects.artificial_stress->exponent = 2; });
-        planted("stress diffusion", [](Scene& m) { m.effects.stress_diffusion->zeta *= 1.01; });
-        planted("gradient correction", [](Scene& m) { m.accuracy.correction = scene::Correction::None; });
-        planted("gravity", [](Scene& m) { m.effects.gravity->z *= 1.01; });
-        planted("water table", [](Scene& m) { m.effects.pore_pressure->table[1][1] += 0.01; });
+        plant_faults(planted);
     }
 }

@@ -136,6 +136,12 @@ inline double particle_mass(const Simulation& s, Index i)
 {
     return s.soils()[s.particles()[field::soil][i]].density * s.scene().particle_volume();
 }
+/// Kinetic and elastic energy, J.
+inline double mechanical_energy(const Simulation& s)
+{
+    const auto l = s.ledger();
+    return l.state.kinetic + l.state.elastic;
+}
 inline Vector cross(Vector a, Vector b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline Vector linear_momentum(const Simulation& s)
 {
