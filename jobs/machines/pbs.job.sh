@@ -36,20 +36,12 @@ if [ -e "$ended" ]; then
     exit 1
 fi
 trap '[ $? = 5 ] || : >"$ended"' EXIT
-
-go_on() {
-    echo "job: the next job of the chain goes on from the checkpoint; was this the last one, submit the script again"
-    exit 5
-}
+{{include chained.part.sh}}
 {{end}}
 {{if not chain}}
 {{include keep.part.sh}}
 
-go_on() {
-    echo "job: submitting the next job, to go on from the checkpoint"
-    qsub "$self" && exit 5
-    echo "job: not done yet; submit the script again and it goes on from the checkpoint" >&2
-    exit 5
-}
+submit_again() { qsub "$self"; }
+{{include again.part.sh}}
 {{end}}
 {{include run.part.sh}}

@@ -27,20 +27,12 @@ if [ -z "${PJM_JOBID:-}" ]; then
     for ((k = 1; k < jobs; k++)); do pjsub --step --sparam "jid=$id,sd=ec!=5:all" "$0" || exit; done
     exit
 fi
-
-go_on() {
-    echo "job: the next job of the chain goes on from the checkpoint; was this the last one, submit the script again"
-    exit 5
-}
+{{include chained.part.sh}}
 {{end}}
 {{if not chain}}
 {{include keep.part.sh}}
 
-go_on() {
-    echo "job: submitting the next job, to go on from the checkpoint"
-    pjsub "$self" && exit 5
-    echo "job: not done yet; submit the script again and it goes on from the checkpoint" >&2
-    exit 5
-}
+submit_again() { pjsub "$self"; }
+{{include again.part.sh}}
 {{end}}
 {{include run.part.sh}}
