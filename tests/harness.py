@@ -11,10 +11,11 @@ failures = []
 
 
 def check(good, what):
-    """Says what holds and what does not; a test goes on, and fails at its end."""
+    """Says what holds and what does not, and gives it back; a test goes on, and fails at its end."""
     print(("ok    " if good else "FAIL  ") + what, flush=True)
     if not good:
         failures.append(what)
+    return good
 
 
 def finish():

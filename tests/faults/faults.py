@@ -47,9 +47,6 @@ def scene_text(end=0.02, every=0.005, checkpoint=30.0):
     return SCENE.format(end=end, every=every, checkpoint=checkpoint)
 
 
-    return good
-
-
 class Place:
     """A directory that goes in the end. MPI keeps its own files there too, so that what a kill leaves goes with it."""
 
