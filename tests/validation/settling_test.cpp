@@ -8,12 +8,13 @@ namespace {
 
 const std::string at_rest = "soil = \"s\"\nstress = \"at rest\"";
 
-/// A bank of 4 m with a slope in front, between smooth walls on a rough floor; of cohesive soil, 2-D. Mirrored: at -x.
-SceneText bank(double top, const std::string& strength, int side = 1)
+/// A bank of 4 m with a slope in front, between smooth walls on a rough floor; of cohesive soil, 2-D. Mirrored: at -x; moved along x by
+/// `shift` m.
+SceneText bank(double top, const std::string& strength, int side = 1, double shift = 0)
 {
     SceneText t;
     t.spacing = 0.25, t.density = 1900, t.young = 2e7, t.strength = strength;
-    const auto x = [&](double a) { return side * a; };
+    const auto x = [&](double a) { return side * a + shift; };
     const auto wall = [&](double a, double b, double low, double high, const char* surface) {
         return box("wall", {std::min(x(a), x(b)), 0, low}, {std::max(x(a), x(b)), 0, high}, fmt::format("surface = \"{}\"", surface));
     };
@@ -79,24 +80,27 @@ TEST(Settling, ALayerUnderTiltedGravityHangsOnItsFloor)
     });
 }
 
-TEST(Settling, TheMirroredBankGetsTheMirroredStress)
+TEST(Settling, TheMirroredAndTheMovedBankGetTheSameStress)
 {
     const std::string strength = "cohesion = 1.0e4\nfriction_angle = 25.0";
-    Simulation a(Comm::world(), bank(5, strength).scene()), b(Comm::world(), bank(5, strength, -1).scene());
-    std::map<std::pair<long, long>, Stress> left;
-    const auto place = [](const Simulation& s, Index i, int side) {
+    const auto index = [](const Simulation& s, Index i, int side, double shift) {
         const Vector x = s.filling().soil_position(s.particles()[field::id][i]);
-        return std::pair{std::lround(side * x.x * 100), std::lround(x.z * 100)};
+        return std::pair{std::lround(side * (x.x - shift) * 100), std::lround(x.z * 100)};
     };
-    each(a, [&](Index i) { left[place(a, i, 1)] = stress(a, i); });
-    ASSERT_EQ(a.particles().size(), b.particles().size());
-    each(b, [&](Index i) {
-        ASSERT_TRUE(left.contains(place(b, i, -1)));
-        const Stress s = left[place(b, i, -1)], m = stress(b, i);
-        EXPECT_NEAR(s.zz, m.zz, 1e-6 * 8e4);
-        EXPECT_NEAR(s.xx, m.xx, 1e-6 * 8e4);
-        EXPECT_NEAR(s.xz, -m.xz, 1e-6 * 8e4);
-    });
+    std::map<std::pair<long, long>, Stress> first;
+    Simulation a(Comm::world(), bank(5, strength).scene());
+    each(a, [&](Index i) { first[index(a, i, 1, 0)] = stress(a, i); });
+    for (const auto& [side, shift] : {std::pair{-1, 0.0}, std::pair{1, 1000.0}, std::pair{-1, -2500.0}}) {
+        Simulation b(Comm::world(), bank(5, strength, side, shift).scene());
+        ASSERT_EQ(a.particles().size(), b.particles().size());
+        each(b, [&](Index i) {
+            ASSERT_TRUE(first.contains(index(b, i, side, shift)));
+            const Stress s = first[index(b, i, side, shift)], m = stress(b, i);
+            EXPECT_NEAR(s.zz, m.zz, 1e-6 * 8e4);
+            EXPECT_NEAR(s.xx, m.xx, 1e-6 * 8e4);
+            EXPECT_NEAR(s.xz, side * m.xz, 1e-6 * 8e4);
+        });
+    }
 }
 
 // What does not stand is held, like soil behind a gate, and let go at t = 0.
