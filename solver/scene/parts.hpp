@@ -4,12 +4,16 @@
 // whose other keys (output, time, accuracy) may change without compiling the kernels again.
 #include "solver/core/tensor.hpp"
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 namespace kuzure::scene {
+
+struct Grid;
+class HeightField;
 
 // ---- shapes (solver/scene/shape.hpp knows their geometry) ----
 struct Box {
@@ -32,6 +36,28 @@ struct Polygon {
     std::vector<std::array<double, 2>> points; // x, z in m
     std::array<double, 2> y{};                 // m
     bool operator==(const Polygon&) const = default;
+};
+/// Everything below a height field, down to where no soil can feel it.
+struct Ground {
+    std::shared_ptr<const HeightField> field; // as wide as the wall
+    double depth = 0;                         // m, of the wall particles' layer, along z
+    bool operator==(const Ground&) const;     // by its heights
+};
+/// A closed ring of corners in plan, m; the last corner is not the first again.
+using Ring = std::vector<std::array<double, 2>>;
+/// The mass that fails: soil on a height field within an outline. What its files hold is in `bed`, `rings` and `thicknesses`.
+struct Release {
+    std::string outline;             // .shp or .geojson, an absolute path; empty: all of the maps
+    std::optional<double> thickness; // m along z, everywhere the same
+    std::string thickness_map;       // raster of thicknesses, an absolute path
+    std::string surface;             // raster of the slip surface, an absolute path
+    std::string before, after;       // elevation models before and after, absolute paths
+    bool on_top = false;             // the elevation model is the slip surface: soil lies on it
+
+    std::shared_ptr<const HeightField> bed;
+    std::vector<Ring> rings;                 // outer rings and holes: inside is what an odd number of them encloses; none: everywhere
+    std::shared_ptr<const Grid> thicknesses; // m along z; where it is absent `thickness` counts
+    bool operator==(const Release&) const;   // by what it was made from
 };
 using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
 

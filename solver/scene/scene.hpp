@@ -59,6 +59,34 @@ struct Start {
     bool operator==(const Start&) const = default;
 };
 
+// ---- real ground ----
+enum class Edge { Open, Closed }; // what soil does that leaves the ground: it is counted, or it ends the run
+/// Elevation models, and how soil meets the ground. The ground itself is a wall with the shape Ground, made from these when a scene is
+/// read.
+struct Terrain {
+    std::vector<std::string> dem;                // absolute paths; a later one fills what earlier ones leave open
+    std::string crs;                             // "EPSG:6670"; empty: that of the files
+    std::optional<std::array<double, 4>> window; // m, x and y from, x and y to, in the CRS; absent: all of the files
+    Surface surface = Surface::Coulomb;
+    double friction_angle = 0; // rad, for Coulomb
+    Edge edge = Edge::Open;
+    bool operator==(const Terrain&) const = default;
+};
+/// Where the scene's coordinates lie on the map.
+struct MapFrame {
+    std::string crs;     // as WKT; empty: nowhere
+    double x = 0, y = 0; // m, map coordinates of the scene's origin
+    bool operator==(const MapFrame&) const = default;
+};
+/// Rasters of what happened.
+struct Maps {
+    double cell = 0;            // m; 0: two spacings
+    double wet = 0;             // m, least thickness that counts; 0: one spacing
+    std::vector<double> limits; // m, thicknesses whose outlines are drawn
+    std::string points;         // file of named points, an absolute path; empty: none
+    bool operator==(const Maps&) const = default;
+};
+
 } // namespace kuzure::scene
 
 namespace kuzure {
@@ -71,6 +99,9 @@ struct Scene {
     std::vector<scene::Soil> soils;
     std::vector<scene::Body> bodies;
     std::vector<scene::Wall> walls;
+    std::optional<scene::Terrain> terrain;
+    scene::MapFrame map_frame; // of the terrain
+    std::optional<scene::Maps> maps;
     scene::Start start;
     scene::Effects effects;
     scene::Accuracy accuracy;

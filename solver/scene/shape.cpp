@@ -1,8 +1,19 @@
 #include "solver/scene/shape.hpp"
+#include "solver/scene/height_field.hpp"
 #include <initializer_list>
 #include <numbers>
 
 namespace kuzure::scene {
+
+bool Ground::operator==(const Ground& o) const
+{
+    return depth == o.depth && (field == o.field || (field && o.field && field->grid() == o.field->grid()));
+}
+bool Release::operator==(const Release& o) const
+{
+    return outline == o.outline && thickness == o.thickness && thickness_map == o.thickness_map && surface == o.surface &&
+           before == o.before && after == o.after && on_top == o.on_top;
+}
 namespace {
 
 struct Point {
