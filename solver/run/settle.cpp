@@ -21,6 +21,9 @@ Scene settling_scene(const Scene& scene, double end, bool held)
         soil.softening.reset(), soil.dilation_decay.reset(), soil.rate_friction.reset();
         if (held) soil.cohesion = 1e3 * soil.young, soil.tension_cutoff.reset();
     }
+    // Soil holds on to real ground until it is let go.
+    for (auto& wall : s.walls)
+        if (std::holds_alternative<scene::Ground>(wall.shape)) wall.surface = scene::Surface::Rough;
     s.effects.damping = scene::Damping{1, std::numeric_limits<double>::infinity()};
     s.time.end = end, s.time.retry = false;
     s.accuracy.sleep_below = 0;
@@ -99,7 +102,7 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
 {
     // Soil that stands sinks by its elastic strain under its own weight at most, rho g H^2/E, from zero stress.
     double most = scene.space.spacing;
-    const double height = filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing;
+    const double height = filling.soil_height();
     for (const auto& b : scene.bodies)
         if (scene::rests(b)) {
             const auto& soil = scene.soils[std::size_t(b.soil)];

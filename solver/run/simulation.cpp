@@ -291,10 +291,9 @@ double Simulation::damping() const
     const auto& d = scene_.effects.damping;
     if (!d || clock_.time >= d->until) return 0;
     // mu_d = ratio * 2 omega_1, omega_1 = pi c_p/(2 H): critical for the lowest mode of a column of height H
-    const auto& b = filling_.soil_bounds();
     double c = 0;
     for (const auto& m : soils_) c = std::max(c, m.c_p);
-    return d->ratio * std::numbers::pi * c / (b.high.z - b.low.z + scene_.space.spacing);
+    return d->ratio * std::numbers::pi * c / filling_.soil_height();
 }
 
 SleepStage Simulation::sleep_stage() const

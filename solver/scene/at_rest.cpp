@@ -183,6 +183,9 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
         for (const auto& corner : effects.pore_pressure->table)
             if (corner[1] != effects.pore_pressure->table.front()[1]) return "the water table is not level";
 
+    if (std::ranges::any_of(scene.walls, [](const Wall& w) { return std::holds_alternative<Ground>(w.shape); }))
+        return "the soil lies on real ground, which is not level";
+
     const Columns columns(scene, filling);
     const double far = std::numeric_limits<double>::infinity();
     const bool flat = scene.dimensions == 2;
@@ -206,7 +209,7 @@ double time_through_height(const Scene& scene, const Filling& filling)
     double c = std::numeric_limits<double>::infinity();
     for (const Body& b : scene.bodies)
         if (rests(b)) c = std::min(c, Material::from(scene.soils[std::size_t(b.soil)]).c_p);
-    return (filling.soil_bounds().high.z - filling.soil_bounds().low.z + scene.space.spacing) / c;
+    return filling.soil_height() / c;
 }
 
 double steps_to_settle(const Scene& scene, const Filling& filling) { return 8 * time_through_height(scene, filling) / step_at_rest(scene); }

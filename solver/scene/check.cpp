@@ -226,6 +226,7 @@ void check_bodies(const Scene& scene, Rules& rules)
         const std::string key = text("wall.{}", w);
         const Shape& shape = scene.walls[w].shape;
         check_shape(scene, shape, key, rules);
+        if (std::holds_alternative<Ground>(shape)) continue; // as deep as soil can feel it
         const Box box = bounds(shape);
         double thickness = std::min(box.high.x - box.low.x, box.high.z - box.low.z);
         if (!flat) thickness = std::min(thickness, box.high.y - box.low.y);
@@ -603,6 +604,7 @@ void check_edges(const Scene& scene, Rules& rules)
         return bodies.any(x, [&](std::size_t k) { return contains(scene.bodies[k].shape, x, scene.dimensions); });
     };
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        if (std::holds_alternative<Release>(scene.bodies[b].shape)) continue; // its rim is the ground's
         const Box body = bounds(scene.bodies[b].shape);
         const double floor = body.low.z - 0.5 * dx, foot = body.low.z + 0.5 * dx;
         std::string sides;
@@ -678,7 +680,7 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
                       steps_to_settle(scene, *filling)),
                  true});
         if (!scene.start.from.empty()) scene.notes.push_back({"start", "from the last state of " + scene.start.from, true});
-        const double height = filling->soil_bounds().high.z - filling->soil_bounds().low.z + scene.space.spacing;
+        const double height = filling->soil_height();
         if (scene.output.grain && *scene.output.grain > height)
             rules.warning("output.grain",
                           text("no column of soil is {:.4g} m high, all of it {:.4g} m: fronts in history.csv will be empty",

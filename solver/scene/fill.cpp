@@ -117,6 +117,8 @@ std::vector<Zone> zones_near_surface(const Shape& shape, double y, double z, dou
     return zones;
 }
 
+bool on_ground(const Shape& shape) { return std::holds_alternative<Ground>(shape) || std::holds_alternative<Release>(shape); }
+
 } // namespace
 
 /// Cuts indices along x into runs that lie all inside or all outside: single points within the zones and at
@@ -377,13 +379,33 @@ bool Lattice::reaches_into(const Shape& other) const
     return false;
 }
 
+namespace {
+
+/// True if particles of one shape lie inside another, either way. Particles draped over the ground lie where it is: soil on top of it, the
+/// ground below.
+bool reaches_into(const Points& a, const Shape& of_a, const Points& b, const Shape& of_b, const Scene& scene)
+{
+    if (a.lattice() && b.lattice()) return a.lattice()->reaches_into(of_b) || b.lattice()->reaches_into(of_a);
+    if (std::holds_alternative<Ground>(of_a) || std::holds_alternative<Ground>(of_b))
+        if (std::holds_alternative<Release>(of_a) || std::holds_alternative<Release>(of_b)) return false;
+    const double depth = std::max(slack(of_a, scene.space.spacing, scene.dimensions), slack(of_b, scene.space.spacing, scene.dimensions));
+    const auto inside = [&](const Points& points, const Shape& other) {
+        bool found = false;
+        points.for_each_in(bounds(other), [&](std::int64_t, Vector x) { found = found || signed_distance(other, x) < -depth; });
+        return found;
+    };
+    return inside(a, of_b) || inside(b, of_a);
+}
+
+} // namespace
+
 Filling::Survey Filling::survey(const Scene& scene)
 {
     struct Piece {
         std::string name, key;
         const Shape* shape;
         std::string problem;
-        std::optional<Lattice> lattice;
+        std::optional<Points> points;
     };
     std::vector<Piece> pieces;
     const auto add = [&](const std::string& name, const Shape& shape) {
@@ -396,9 +418,10 @@ Filling::Survey Filling::survey(const Scene& scene)
     const int dimensions = scene.dimensions;
     double rows = 0, edge_tests = 0;
     for (auto& p : pieces) {
-        p.problem = Lattice::problem(*p.shape, scene.space.spacing, dimensions);
+        p.problem = on_ground(*p.shape) ? Draped::problem(*p.shape, scene.space.spacing, dimensions)
+                                        : Lattice::problem(*p.shape, scene.space.spacing, dimensions);
         if (!p.problem.empty()) continue;
-        rows += Lattice::rows(*p.shape, scene.space.spacing, dimensions);
+        if (!on_ground(*p.shape)) rows += Lattice::rows(*p.shape, scene.space.spacing, dimensions);
         if (const auto* polygon = std::get_if<Polygon>(p.shape)) edge_tests += scene::edge_tests(*polygon, scene.space.spacing);
         if (rows <= most_rows && edge_tests <= most_edge_tests) continue;
         issues.push_back({Severity::Error,
@@ -414,6 +437,8 @@ Filling::Survey Filling::survey(const Scene& scene)
             issues.push_back({Severity::Error, p.key, std::move(p.problem), {}});
             continue;
         }
+        if (const auto* ground = std::get_if<Ground>(p.shape)) p.points.emplace(Draped(*ground, scene.space.spacing));
+        if (const auto* release = std::get_if<Release>(p.shape)) p.points.emplace(Draped(*release, scene.space.spacing));
         // Bodies lie within the space, walls within its periods: no point of theirs may lie on the other side by rounding.
         Vector least = Lattice::nowhere;
         if (scene.space.low) {
@@ -423,8 +448,8 @@ Filling::Survey Filling::survey(const Scene& scene)
             if (body || periodic[1]) least.y = scene.space.low->y;
             if (body || periodic[2]) least.z = scene.space.low->z;
         }
-        p.lattice.emplace(*p.shape, scene.space.spacing, dimensions, least);
-        if (p.lattice->size() == 0)
+        if (!p.points) p.points.emplace(Lattice(*p.shape, scene.space.spacing, dimensions, least));
+        if (p.points->size() == 0)
             issues.push_back({Severity::Error,
                               p.key,
                               fmt::format("expected particles inside, found none at a spacing of {} m; make "
@@ -440,14 +465,14 @@ Filling::Survey Filling::survey(const Scene& scene)
     for (std::size_t i = 0; i < pieces.size() && issues.size() < enough; ++i)
         for (const std::size_t j : near.meeting(boxes[i])) {
             const auto &a = pieces[i], &b = pieces[j];
-            if (j <= i || issues.size() >= enough || !a.lattice || !b.lattice) continue;
+            if (j <= i || issues.size() >= enough || !a.points || !b.points) continue;
             const double depth = common(boxes[i], boxes[j], dimensions);
             if (depth <= std::max(slack(*a.shape, scene.space.spacing, dimensions), slack(*b.shape, scene.space.spacing, dimensions)))
                 continue;
             const bool boxes = std::holds_alternative<Box>(*a.shape) && std::holds_alternative<Box>(*b.shape);
             // Points of one shape outside another are half a spacing from a box's points, and shapes other
             // than boxes share one lattice: no points strictly inside means no points too close.
-            if (boxes || a.lattice->reaches_into(*b.shape) || b.lattice->reaches_into(*a.shape))
+            if (boxes || reaches_into(*a.points, *a.shape, *b.points, *b.shape, scene))
                 issues.push_back({Severity::Error, b.name,
                                   fmt::format("expected shapes that at most touch, found an overlap of {} with {}{}; "
                                               "move or cut one of them",
@@ -455,7 +480,7 @@ Filling::Survey Filling::survey(const Scene& scene)
                                   a.name});
         }
     Survey all{std::move(issues), {}};
-    for (auto& p : pieces) all.lattices.push_back(std::move(p.lattice));
+    for (auto& p : pieces) all.points.push_back(std::move(p.points));
     return all;
 }
 
@@ -478,35 +503,44 @@ Filling::Filling(const Scene& scene, Survey found) : n_bodies_(scene.bodies.size
     if (!errors.empty()) throw BadInput(errors);
 
     first_id_ = {0};
-    for (auto& lattice : found.lattices) {
-        lattices_.push_back(std::move(*lattice));
-        first_id_.push_back(first_id_.back() + lattices_.back().size());
-        const Box& box = lattices_.back().bounds();
-        bounds_ = lattices_.size() == 1 ? box : united(bounds_, box);
-        if (lattices_.size() == n_bodies_) soil_bounds_ = bounds_;
+    for (auto& points : found.points) {
+        points_.push_back(std::move(*points));
+        first_id_.push_back(first_id_.back() + points_.back().size());
+        const Box& box = points_.back().bounds();
+        bounds_ = points_.size() == 1 ? box : united(bounds_, box);
+        if (points_.size() == n_bodies_) soil_bounds_ = bounds_;
     }
+    const bool draped =
+        std::any_of(points_.begin(), points_.begin() + std::ptrdiff_t(n_bodies_), [](const Points& p) { return p.draped(); });
+    if (!draped) soil_height_ = soil_bounds_.high.z - soil_bounds_.low.z + scene.space.spacing;
+    else
+        for (std::size_t b = 0; b < n_bodies_; ++b) {
+            const Box& box = points_[b].bounds();
+            soil_height_ = std::max(soil_height_,
+                                    points_[b].draped() ? points_[b].draped()->thickest() : box.high.z - box.low.z + scene.space.spacing);
+        }
 }
 
 std::int64_t Filling::soil_count_in(const Box& region) const
 {
     std::int64_t sum = 0;
-    for (std::size_t b = 0; b < n_bodies_; ++b) sum += lattices_[b].count_in(region);
+    for (std::size_t b = 0; b < n_bodies_; ++b) sum += points_[b].count_in(region);
     return sum;
 }
 std::int64_t Filling::wall_count_in(const Box& region) const
 {
     std::int64_t sum = 0;
-    for (std::size_t w = n_bodies_; w < lattices_.size(); ++w) sum += lattices_[w].count_in(region);
+    for (std::size_t w = n_bodies_; w < points_.size(); ++w) sum += points_[w].count_in(region);
     return sum;
 }
 
 std::optional<std::vector<GridPart>> Filling::grids_in(const Box& region) const
 {
     std::vector<GridPart> parts;
-    for (std::size_t k = 0; k < lattices_.size(); ++k) {
-        auto part = lattices_[k].grid_in(region);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        auto part = points_[k].grid_in(region);
         if (!part) {
-            if (lattices_[k].count_in(region) > 0) return std::nullopt;
+            if (points_[k].count_in(region) > 0) return std::nullopt;
             continue;
         }
         if (part->n[0] * part->n[1] * part->n[2] == 0) continue;
@@ -525,7 +559,7 @@ Vector Filling::soil_position(std::int64_t id) const
 {
     ensure(id < soil_count(), "a wall's id is used as soil");
     const std::size_t b = owner(id);
-    return lattices_[b].position(id - first_id_[b]);
+    return points_[b].position(id - first_id_[b]);
 }
 int Filling::body_of(std::int64_t id) const
 {
@@ -536,7 +570,7 @@ Vector Filling::wall_position(std::int64_t id) const
 {
     ensure(id >= soil_count(), "a soil particle's id is used as a wall");
     const std::size_t w = owner(id);
-    return lattices_[w].position(id - first_id_[w]);
+    return points_[w].position(id - first_id_[w]);
 }
 int Filling::wall_of(std::int64_t id) const
 {

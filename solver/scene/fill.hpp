@@ -1,6 +1,7 @@
 #pragma once
 // The particles a scene starts with, computed and never stored: the lattice points of bodies and walls, by id
 // or by region. Every rank and every region gets the same bits, because one function computes every coordinate.
+#include "solver/scene/draped.hpp"
 #include "solver/scene/issue.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/scene/shape.hpp"
@@ -121,6 +122,47 @@ private:
     Box bounds_{};
 };
 
+/// The particles of one shape: on a lattice of its own, or draped over the ground.
+class Points {
+public:
+    Points(Lattice lattice) : of_(std::move(lattice)) {}
+    Points(Draped draped) : of_(std::move(draped)) {}
+    const Lattice* lattice() const { return std::get_if<Lattice>(&of_); }
+    const Draped* draped() const { return std::get_if<Draped>(&of_); }
+    std::int64_t size() const
+    {
+        return std::visit([](const auto& p) { return p.size(); }, of_);
+    }
+    const Box& bounds() const
+    {
+        return std::visit([](const auto& p) -> const Box& { return p.bounds(); }, of_);
+    }
+    Vector position(std::int64_t local) const
+    {
+        return std::visit([&](const auto& p) { return p.position(local); }, of_);
+    }
+    std::int64_t count_in(const Box& region) const
+    {
+        return std::visit([&](const auto& p) { return p.count_in(region); }, of_);
+    }
+    std::optional<GridPart> grid_in(const Box& region) const { return lattice() ? lattice()->grid_in(region) : std::nullopt; }
+    template <class Visit> void for_each_in(const Box& region, Visit visit) const
+    {
+        std::visit([&](const auto& p) { p.for_each_in(region, visit); }, of_);
+    }
+    template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const
+    {
+        if (lattice()) lattice()->for_each_stack_in(region, visit);
+        else
+            draped()->for_each_stack_in(region, [&](double x, double y, double foot, double top) {
+                visit(Lattice::Stack{x, y, foot, top});
+            });
+    }
+
+private:
+    std::variant<Lattice, Draped> of_;
+};
+
 /// All bodies and walls of a scene. Ids from 0: soil in file order, then walls.
 class Filling {
 public:
@@ -134,34 +176,36 @@ public:
     std::int64_t soil_count() const { return first_id_[n_bodies_]; }
     std::int64_t wall_count() const { return first_id_.back() - soil_count(); }
     /// Particles of one body or wall.
-    std::int64_t body_count(int body) const { return lattices_[std::size_t(body)].size(); }
-    std::int64_t wall_count(int wall) const { return lattices_[n_bodies_ + std::size_t(wall)].size(); }
+    std::int64_t body_count(int body) const { return points_[std::size_t(body)].size(); }
+    std::int64_t wall_count(int wall) const { return points_[n_bodies_ + std::size_t(wall)].size(); }
     /// The smallest box around all soil particles (m), and around all particles.
     const Box& soil_bounds() const { return soil_bounds_; }
+    /// Height of the soil from its foot to its top, m; of soil on real ground its greatest thickness.
+    double soil_height() const { return soil_height_; }
     const Box& bounds() const { return bounds_; }
 
     /// Calls visit(std::int64_t id, Vector x, int body) for the soil particles in a closed region, by rising id.
     template <class Visit> void for_each_soil_in(const Box& region, Visit visit) const
     {
         for (std::size_t b = 0; b < n_bodies_; ++b)
-            lattices_[b].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
+            points_[b].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
     }
     /// Calls visit(Lattice::Stack) for the stacks of one body's particles in a closed region.
     template <class Visit> void for_each_stack_of(int body, const Box& region, Visit visit) const
     {
-        lattices_[std::size_t(body)].for_each_stack_in(region, visit);
+        points_[std::size_t(body)].for_each_stack_in(region, visit);
     }
     /// Calls visit(Lattice::Stack, int body) for the stacks of soil particles in a closed region.
     template <class Visit> void for_each_soil_stack_in(const Box& region, Visit visit) const
     {
         for (std::size_t b = 0; b < n_bodies_; ++b)
-            lattices_[b].for_each_stack_in(region, [&](const Lattice::Stack& s) { visit(s, int(b)); });
+            points_[b].for_each_stack_in(region, [&](const Lattice::Stack& s) { visit(s, int(b)); });
     }
     /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising id.
     template <class Visit> void for_each_wall_in(const Box& region, Visit visit) const
     {
-        for (std::size_t w = n_bodies_; w < lattices_.size(); ++w)
-            lattices_[w].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
+        for (std::size_t w = n_bodies_; w < points_.size(); ++w)
+            points_[w].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
     }
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;
@@ -180,16 +224,17 @@ public:
 private:
     struct Survey {
         Issues issues;
-        std::vector<std::optional<Lattice>> lattices; // bodies, then walls; nothing where a shape cannot be filled
+        std::vector<std::optional<Points>> points; // bodies, then walls; nothing where a shape cannot be filled
     };
     static Survey survey(const Scene&);
     Filling(const Scene&, Survey);
     std::size_t owner(std::int64_t id) const;
 
     std::size_t n_bodies_;
-    std::vector<Lattice> lattices_;      // bodies, then walls
+    std::vector<Points> points_;         // bodies, then walls
     std::vector<std::int64_t> first_id_; // of every lattice, and the end
     Box soil_bounds_{}, bounds_{};
+    double soil_height_ = 0;
 };
 
 template <class Visit> void Lattice::for_each_in(const Box& region, Visit visit) const

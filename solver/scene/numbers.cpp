@@ -12,7 +12,7 @@ std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
         all.push_back({name, value, std::move(about), doubtful ? std::move(warning) : std::string()});
     };
     const Box b = f.soil_bounds();
-    const double dx = s.space.spacing, height = b.high.z - b.low.z + dx, width = b.high.x - b.low.x + dx;
+    const double dx = s.space.spacing, height = f.soil_height(), width = b.high.x - b.low.x + dx;
     const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
     double softest = std::numeric_limits<double>::infinity(), slowest = softest, fastest_body = 0, cohesion = 0;
     bool rate = true;
@@ -34,7 +34,10 @@ std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
                 "the soil is so soft that its own weight strains it by {:.1f} %: a stiffer one (young) would be nearer to rigid grains",
                 100 * strain));
     }
-    const double fall = std::sqrt(2 * g * height), speed = std::max(fall, fastest_body);
+    double drop = height; // real ground: as far as it goes down
+    for (const auto& wall : s.walls)
+        if (const auto* ground = std::get_if<Ground>(&wall.shape)) drop = std::max(drop, b.high.z - ground->field->lowest());
+    const double fall = std::sqrt(2 * g * drop), speed = std::max(fall, fastest_body);
     if (speed > 0)
         add("mach", speed / slowest, "sqrt(2 g H)/c_p or the fastest body's; below 0.1 the P-wave's speed does not show, above 0.3 it does",
             speed / slowest > 0.3,
@@ -62,7 +65,7 @@ std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
 
 std::vector<SoilNumbers> soil_numbers(const Scene& s, const Filling& f)
 {
-    const double height = f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing;
+    const double height = f.soil_height();
     const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
     std::vector<SoilNumbers> all;
     for (const auto& soil : s.soils) {

@@ -59,7 +59,7 @@ struct Release {
     std::shared_ptr<const Grid> thicknesses; // m along z; where it is absent `thickness` counts
     bool operator==(const Release&) const;   // by what it was made from
 };
-using Shape = std::variant<Box, Cylinder, Sphere, Polygon>;
+using Shape = std::variant<Box, Cylinder, Sphere, Polygon, Ground, Release>;
 
 // ---- matter ----
 enum class Cone { Compression, Extension, PlaneStrain, PlaneStrainNoDilation, Shear };

@@ -41,6 +41,32 @@ bool encloses(const Polygon& polygon, Point x)
     return inside;
 }
 
+/// Even-odd rule in plan: inside is what an odd number of rings encloses.
+bool encloses(const std::vector<Ring>& rings, double x, double y)
+{
+    bool inside = false;
+    for (const Ring& ring : rings)
+        for (std::size_t k = 0; k < ring.size(); ++k) {
+            const auto &a = ring[k], &b = ring[k + 1 < ring.size() ? k + 1 : 0];
+            if ((a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) inside = !inside;
+        }
+    return inside;
+}
+
+/// Distance (m) in plan to the outline of a release.
+double distance_to_rings(const Release& r, Vector x)
+{
+    double least = std::numeric_limits<double>::infinity();
+    for (const Ring& ring : r.rings)
+        for (std::size_t k = 0; k < ring.size(); ++k) {
+            const auto &a = ring[k], &b = ring[k + 1 < ring.size() ? k + 1 : 0];
+            const double ex = b[0] - a[0], ey = b[1] - a[1], l2 = ex * ex + ey * ey;
+            const double t = l2 > 0 ? std::clamp(((x.x - a[0]) * ex + (x.y - a[1]) * ey) / l2, 0.0, 1.0) : 0;
+            least = std::min(least, std::hypot(x.x - a[0] - t * ex, x.y - a[1] - t * ey));
+        }
+    return least;
+}
+
 /// Half-open ball or disc: x minus its centre, in the order in which coordinates decide.
 bool round_holds(std::initializer_list<double> from_centre, double radius, double tolerance)
 {
@@ -131,6 +157,50 @@ Contact contact(const Polygon& polygon, Vector x, int dimensions)
     return detail::intersect(in_plane, detail::slab(x.y, polygon.y[0], polygon.y[1], {0, 1, 0}));
 }
 
+Contact contact(const Ground& ground, Vector x, int)
+{
+    const auto n = ground.field->nearest(x);
+    if (!std::isfinite(n.distance)) return {std::numeric_limits<double>::infinity(), {0, 0, 1}};
+    return {n.distance, n.normal};
+}
+
+Contact contact(const Release& r, Vector x, int)
+{
+    const double h = thickness(r, x.x, x.y);
+    if (!(h > 0)) return {distance_to_rings(r, x), {0, 0, 1}};
+    const auto bed = r.bed->at(x.x, x.y);
+    const double slope = 1 / std::sqrt(1 + bed.dz_dx * bed.dz_dx + bed.dz_dy * bed.dz_dy), up = x.z - bed.z;
+    const Vector normal{-slope * bed.dz_dx, -slope * bed.dz_dy, slope};
+    return up - h >= -up ? Contact{slope * (up - h), normal} : Contact{-slope * up, -1.0 * normal};
+}
+
+double thickness(const Release& r, double x, double y)
+{
+    if (!std::isfinite(r.bed->at(x, y).z) || !(r.rings.empty() || encloses(r.rings, x, y))) return 0;
+    if (!r.thicknesses) return r.thickness.value_or(0);
+    // Bilinear between the points of the map; what has no number there holds no soil.
+    const Grid& g = *r.thicknesses;
+    const double u = (x - g.x) / g.cell, v = (y - g.y) / g.cell;
+    if (!(u >= 0 && v >= 0 && u <= g.columns - 1 && v <= g.rows - 1)) return 0;
+    const int i = std::min(int(u), g.columns - 2), j = std::min(int(v), g.rows - 2);
+    const double a = u - i, b = v - j;
+    const double h = (1 - b) * ((1 - a) * g.at(i, j) + a * g.at(i + 1, j)) + b * ((1 - a) * g.at(i, j + 1) + a * g.at(i + 1, j + 1));
+    return h > 0 ? h : 0;
+}
+
+Extent extent(const Release& r)
+{
+    const Box b = bounds(r);
+    constexpr int n = 512; // samples along each axis
+    const double dx = (b.high.x - b.low.x) / n, dy = (b.high.y - b.low.y) / n;
+    Extent e{0, 0, 0};
+    for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i)
+            if (const double h = thickness(r, b.low.x + (i + 0.5) * dx, b.low.y + (j + 0.5) * dy); h > 0)
+                e.volume += h * dx * dy, e.area += dx * dy, e.thickest = std::max(e.thickest, h);
+    return e;
+}
+
 bool holds(const Shape& shape, Vector x, int dimensions, double tolerance)
 {
     const bool flat = dimensions == 2;
@@ -151,6 +221,14 @@ bool holds(const Shape& shape, Vector x, int dimensions, double tolerance)
         bool operator()(const Sphere& s) const
         {
             return round_holds({x.x - s.center.x, flat ? 0 : x.y - s.center.y, x.z - s.center.z}, s.radius, tolerance);
+        }
+        bool operator()(const Ground& g) const { return scene::contact(g, x).distance < -tolerance; }
+        bool operator()(const Release& r) const
+        {
+            const double h = scene::thickness(r, x.x, x.y);
+            if (!(h > 0)) return false;
+            const double foot = r.bed->at(x.x, x.y).z;
+            return between(x.z, foot, foot + h, tolerance);
         }
         bool operator()(const Polygon& p) const
         {
@@ -179,6 +257,11 @@ double volume(const Shape& shape, int dimensions)
         double operator()(const Cylinder& c) const { return pi * c.radius * c.radius * c.height; }
         double operator()(const Sphere& s) const { return pi * s.radius * s.radius * (flat ? 1 : 4 * s.radius / 3); }
         double operator()(const Polygon& p) const { return std::abs(area(p)) * (flat ? 1 : p.y[1] - p.y[0]); }
+        double operator()(const Ground& g) const
+        {
+            return g.depth * (g.field->high_x() - g.field->low_x()) * (g.field->high_y() - g.field->low_y());
+        }
+        double operator()(const Release& r) const { return extent(r).volume; }
     } of{flat, pi};
     return std::visit(of, shape);
 }
@@ -196,6 +279,46 @@ Box bounds(const Shape& shape)
             const Vector r{s.radius, s.radius, s.radius};
             return {s.center - r, s.center + r};
         }
+        Box operator()(const Ground& g) const
+        {
+            return {{g.field->low_x(), g.field->low_y(), g.field->lowest() - g.depth},
+                    {g.field->high_x(), g.field->high_y(), g.field->highest()}};
+        }
+        Box operator()(const Release& r) const
+        {
+            const auto& f = *r.bed;
+            const double far = std::numeric_limits<double>::infinity(), cell = f.grid().cell;
+            Box box{{f.low_x(), f.low_y(), far}, {f.high_x(), f.high_y(), -far}};
+            if (!r.rings.empty()) {
+                Box around{{far, far, 0}, {-far, -far, 0}};
+                for (const Ring& ring : r.rings)
+                    for (const auto& [px, py] : ring) {
+                        around.low.x = std::min(around.low.x, px), around.low.y = std::min(around.low.y, py);
+                        around.high.x = std::max(around.high.x, px), around.high.y = std::max(around.high.y, py);
+                    }
+                box.low.x = std::max(box.low.x, around.low.x), box.low.y = std::max(box.low.y, around.low.y);
+                box.high.x = std::min(box.high.x, around.high.x), box.high.y = std::min(box.high.y, around.high.y);
+            } else if (r.thicknesses) {
+                const Grid& g = *r.thicknesses;
+                box.low.x = std::max(box.low.x, g.x), box.low.y = std::max(box.low.y, g.y);
+                box.high.x = std::min(box.high.x, g.x + (g.columns - 1) * g.cell),
+                box.high.y = std::min(box.high.y, g.y + (g.rows - 1) * g.cell);
+            }
+            double thickest = r.thicknesses ? 0 : r.thickness.value_or(0);
+            if (r.thicknesses)
+                for (const double h : r.thicknesses->values) thickest = std::max(thickest, h);
+            // Between its points a quadratic surface leaves their heights by less than they differ.
+            const Grid& g = f.grid();
+            for (int j = 0; j < g.rows; ++j)
+                for (int i = 0; i < g.columns; ++i) {
+                    const double x = g.x + i * cell, y = g.y + j * cell;
+                    if (x < box.low.x - cell || x > box.high.x + cell || y < box.low.y - cell || y > box.high.y + cell) continue;
+                    if (const double z = g.at(i, j); std::isfinite(z))
+                        box.low.z = std::min(box.low.z, z), box.high.z = std::max(box.high.z, z);
+                }
+            box.high.z += thickest;
+            return box;
+        }
         Box operator()(const Polygon& p) const
         {
             const double far = std::numeric_limits<double>::infinity();
@@ -212,7 +335,7 @@ Box bounds(const Shape& shape)
 
 const char* name_of(const Shape& shape)
 {
-    static constexpr const char* names[] = {"box", "cylinder", "sphere", "polygon"};
+    static constexpr const char* names[] = {"box", "cylinder", "sphere", "polygon", "ground", "release"};
     return names[shape.index()];
 }
 

@@ -57,6 +57,10 @@ inline Contact contact(const Cylinder& c, Vector x, int = 3)
 }
 /// Distance and normal of an extruded polygon with any number of corners, in either sense of rotation.
 Contact contact(const Polygon&, Vector x, int dimensions = 3);
+/// Distance and normal of the surface of the ground; infinitely far above where there is none.
+Contact contact(const Ground&, Vector x, int dimensions = 3);
+/// Distance and normal of the soil of a release, to first order near its top and foot.
+Contact contact(const Release&, Vector x, int dimensions = 3);
 /// Distance and normal of any shape.
 inline Contact contact(const Shape& shape, Vector x, int dimensions = 3)
 {
@@ -81,7 +85,14 @@ double rounding_of(const Shape&, int dimensions);
 double volume(const Shape&, int dimensions);
 /// The smallest box around a shape; in 2-D its y is that of the file and means nothing.
 Box bounds(const Shape&);
-/// "box", "cylinder", "sphere" or "polygon": the scene's key.
+/// Thickness of a release above a place in plan, m along z; 0 outside its outline and where its bed or thicknesses are unknown.
+double thickness(const Release&, double x, double y);
+/// Volume (m^3) and area in plan (m^2) of a release, and its greatest thickness (m).
+struct Extent {
+    double volume, area, thickest;
+};
+Extent extent(const Release&);
+/// "box", "cylinder", "sphere", "polygon" or "release": the scene's key; "ground".
 const char* name_of(const Shape&);
 /// Area (m^2) of the polygon, positive if its corners run from x towards z.
 double area(const Polygon&);

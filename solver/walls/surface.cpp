@@ -1,4 +1,5 @@
 #include "solver/walls/surface.hpp"
+#include "solver/scene/height_field.hpp"
 #include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <limits>
@@ -57,6 +58,17 @@ template <class Visit> void for_each_face(const scene::Polygon& p, Vector x, int
     if (dimensions == 3 && scene::contains(p, {x.x, 0.5 * (p.y[0] + p.y[1]), x.z}))
         visit(Candidate{{x.x, p.y[1], x.z}, {0, 1, 0}}), visit(Candidate{{x.x, p.y[0], x.z}, {0, -1, 0}});
 }
+template <class Visit> void for_each_face(const scene::Ground& g, Vector x, int, Visit visit)
+{
+    const auto n = g.field->nearest(x);
+    if (!std::isfinite(n.distance)) return;
+    // The way itself is the normal: so also at the focus of a hollow, where many places are as near.
+    const Vector way = x - n.point;
+    const bool far = std::fabs(n.distance) > 1e-6 * g.field->grid().cell;
+    visit(Candidate{n.point, far ? (1 / n.distance) * way : n.normal});
+}
+/// Releases are soil, never walls.
+template <class Visit> void for_each_face(const scene::Release&, Vector, int, Visit) {}
 
 } // namespace
 

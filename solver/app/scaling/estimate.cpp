@@ -59,7 +59,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const double h = s.smoothing_length();
     const double g = s.effects.gravity ? length(*s.effects.gravity) : 0;
     // A collapse moves at about sqrt(g H): the signal speed that shortens a step which follows the motion.
-    const double fall = std::sqrt(g * (f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing));
+    const double fall = std::sqrt(g * f.soil_height());
     e.dt = s.time.step ? *s.time.step : s.accuracy.cfl * h / (c + 0.25 * fall);
     e.steps = std::int64_t(std::llround(s.time.end / e.dt));
 

@@ -96,7 +96,7 @@ double rebuilds(const Scene& s, const scene::Filling& f, double steps)
     for (const auto& b : s.bodies) fastest = std::max(fastest, length(b.velocity));
     double way = fastest * s.time.end;
     if (s.effects.gravity) {
-        const double g = length(*s.effects.gravity), height = f.soil_bounds().high.z - f.soil_bounds().low.z + s.space.spacing;
+        const double g = length(*s.effects.gravity), height = f.soil_height();
         const double top = 0.8 * std::sqrt(g * height), until = top / (0.75 * g), slow = 3 * std::sqrt(height / g), t = s.time.end;
         if (g > 0) {
             way += 0.5 * 0.75 * g * std::pow(std::min(t, until), 2);
