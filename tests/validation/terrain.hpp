@@ -9,7 +9,8 @@ namespace kuzure::validation {
 /// Heights z(x, y) on square cells that cover low .. high (m).
 template <class Height> scene::Grid heights(Height z, std::array<double, 2> low, std::array<double, 2> high, double cell)
 {
-    scene::Grid g{low[0], low[1], cell, int(std::lround((high[0] - low[0]) / cell)) + 1, int(std::lround((high[1] - low[1]) / cell)) + 1, {}};
+    scene::Grid g{low[0], low[1], cell, int(std::lround((high[0] - low[0]) / cell)) + 1, int(std::lround((high[1] - low[1]) / cell)) + 1,
+                  {}};
     g.values.resize(std::size_t(g.columns) * std::size_t(g.rows));
     for (int j = 0; j < g.rows; ++j)
         for (int i = 0; i < g.columns; ++i) g.at(i, j) = z(g.x + i * cell, g.y + j * cell);
