@@ -17,9 +17,27 @@ LAYERS = {
     "solver/pairs": ["solver/core", "solver/scene"],
     "solver/effects": ["solver/core", "solver/scene", "solver/physics", "solver/pairs"],
     "solver/walls": ["solver/core", "solver/scene", "solver/pairs"],
-    "solver/kernels": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours", "solver/pairs", "solver/effects", "solver/walls"],
-    "solver/run": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours", "solver/pairs", "solver/effects", "solver/walls",
-                   "solver/kernels", "decomposition", "perf"],
+    "solver/kernels": [
+        "solver/core",
+        "solver/scene",
+        "solver/physics",
+        "solver/neighbours",
+        "solver/pairs",
+        "solver/effects",
+        "solver/walls",
+    ],
+    "solver/run": [
+        "solver/core",
+        "solver/scene",
+        "solver/physics",
+        "solver/neighbours",
+        "solver/pairs",
+        "solver/effects",
+        "solver/walls",
+        "solver/kernels",
+        "decomposition",
+        "perf",
+    ],
     "decomposition": ["solver/core", "solver/scene"],
     "io": ["solver/core", "solver/scene"],
     "perf/bench": ["solver", "decomposition", "io", "perf"],
@@ -56,7 +74,8 @@ def sources(root):
             if file.suffix in (".hpp", ".cpp", ".h", ".cc", ".hh", ".inl") and file.is_file():
                 lines = file.read_text(errors="replace").splitlines()
                 found[file.relative_to(root).as_posix()] = [
-                    (k, m[1] == '"', m[2]) for k, line in enumerate(lines, 1) if (m := INCLUDE.match(line))]
+                    (k, m[1] == '"', m[2]) for k, line in enumerate(lines, 1) if (m := INCLUDE.match(line))
+                ]
     return found
 
 
@@ -89,7 +108,7 @@ def violations(root, top_level):
                     yield f"{path}:{k}: includes {what}, which only {place} may"
             own = what in includes
             if quoted and not own:
-                yield f"{path}:{k}: \"{what}\" is no file of the project as seen from its root"
+                yield f'{path}:{k}: "{what}" is no file of the project as seen from its root'
             if own and not quoted:
                 yield f"{path}:{k}: <{what}> is the project's own: write it in quotes"
             if own and layer_of(what) != layer and not any(inside(what, allowed) for allowed in LAYERS[layer]):
@@ -143,7 +162,10 @@ PLANTED = {  # file, its text, what must be said of it ("" for nothing)
     "perf/greedy.hpp": ('#include "solver/core/simd.hpp"\n', "perf may not include solver/core/simd.hpp"),
     "perf/bench/rates.cpp": ('#include "solver/kernels/scheme.hpp"\n', ""),
     "solver/app/main.cpp": ('#include "perf/report.hpp"\n', ""),
-    "solver/app/cut.cpp": ('#include "decomposition/cut.hpp"\n', "comes to <mpi.h> through decomposition/cut.hpp -> decomposition/comm.hpp"),
+    "solver/app/cut.cpp": (
+        '#include "decomposition/cut.hpp"\n',
+        "comes to <mpi.h> through decomposition/cut.hpp -> decomposition/comm.hpp",
+    ),
     "solver/app/scene.cpp": ("#include <toml++/toml.h>\n", "which only io may"),
     "tests/unit/metis_test.cpp": ("#include <metis.h>\n", "includes metis.h"),
     "jobs/tool.cpp": ("#include <span>\n", "outside every layer"),

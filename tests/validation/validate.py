@@ -7,7 +7,9 @@
 --publish  write the measured part of docs/verification.md and docs/figures instead of a page among the results
 Exit status 1 if a gate is missed or a negative control passes, or a run fails; every case runs all the same.
 """
-import os, sys, time
+import os
+import sys
+import time
 
 
 def main(arguments):
@@ -48,7 +50,14 @@ def main(arguments):
             failures.append(str(failure))
             print(failure)
     table.main(os.path.join(docs, "verification.md") if "--publish" in flags else os.path.join(RESULTS, "verification.md"))
-    print(f"{time.time() - begin:.0f} s; " + (("all gates met" if "--known" not in flags else "nothing new") if not failures else f"{len(failures)} cases failed:\n  " + "\n  ".join(failures)))
+    print(
+        f"{time.time() - begin:.0f} s; "
+        + (
+            ("all gates met" if "--known" not in flags else "nothing new")
+            if not failures
+            else f"{len(failures)} cases failed:\n  " + "\n  ".join(failures)
+        )
+    )
     return 1 if failures else 0
 
 
