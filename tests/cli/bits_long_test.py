@@ -11,7 +11,7 @@ from harness import check, finish, program, root, scratch
 
 steps = int(sys.argv[3]) if sys.argv[2:3] == ["--steps"] else 10000
 scene = os.path.join(root, "jobs/scenes/hirata_52.toml")
-work = scratch("kuzure-bits-long-")
+work = scratch("bits-long")
 
 
 def run(out, ranks, threads, *extra):

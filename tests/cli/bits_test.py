@@ -9,7 +9,7 @@ sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, scratch
 
 here = os.path.dirname(os.path.abspath(__file__))
-work = scratch("kuzure-bits-")
+work = scratch("bits")
 
 
 def run(scene, out, ranks=1, threads=1, extra=(), expect=0):

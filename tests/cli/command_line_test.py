@@ -11,7 +11,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, scratch
 
-work = scratch("kuzure-door-")
+work = scratch("door")
 os.environ["OMP_NUM_THREADS"] = "1"
 
 

@@ -15,7 +15,7 @@ import numpy as np
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, root, scratch
 
-work = scratch("kuzure-contract-")
+work = scratch("contract")
 
 
 def call(*args, expect=0, **kw):

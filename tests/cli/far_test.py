@@ -51,7 +51,7 @@ def run(work, scene, out, ranks):
     )
 
 
-work = scratch("kuzure-far-")
+work = scratch("far")
 
 
 def main():

@@ -10,7 +10,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, root, scratch
 
-work = scratch("kuzure-hostile-")
+work = scratch("hostile")
 os.environ.update(OMP_NUM_THREADS="1", KUZURE_MPI="0")
 
 

@@ -12,7 +12,7 @@ import h5py
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, scratch
 
-work = scratch("kuzure-picture-")
+work = scratch("picture")
 
 
 def call(*args, expect=0, ranks=1):

@@ -13,7 +13,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, failures, finish, program, scratch
 
-work = scratch("kuzure-damage-")
+work = scratch("damage")
 os.environ.update(OMP_NUM_THREADS="1", XDG_CACHE_HOME=work + "/cache")
 
 

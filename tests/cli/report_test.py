@@ -13,7 +13,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, scratch
 
-work = scratch("kuzure-report-")
+work = scratch("report")
 os.environ["XDG_CACHE_HOME"] = work + "/cache"  # roofs measured beside other tests are not for keeping
 SECTIONS = ["warnings", "pictures", "energy", "heap", "phases", "roofline", "balance", "effects", "provenance", "scene"]
 SCENE = block(

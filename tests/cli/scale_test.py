@@ -8,7 +8,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, finish, program, scratch
 
-work = scratch("kuzure-scale-")
+work = scratch("scale")
 
 
 def call(*command, expect=0):

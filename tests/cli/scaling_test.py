@@ -12,7 +12,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, root, scratch
 
-work = scratch("kuzure-scaling-")
+work = scratch("scaling")
 env = dict(
     os.environ,
     PATH=os.path.join(root, "tests/cluster") + ":" + os.environ["PATH"],

@@ -11,7 +11,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, failures, finish, program, scratch
 
-work = scratch("kuzure-twins-")
+work = scratch("twins")
 os.environ["OMP_NUM_THREADS"] = "1"
 
 SCENE = block(

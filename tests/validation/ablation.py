@@ -12,16 +12,16 @@ import sys
 
 import numpy as np
 
-import v_exp_1
-import v_exp_4
-import v_exp_5
+import aluminium_bars
+import slope_safety
+import cohesive_block
 from common import RESULTS, Case, RunFailed, accepted, changed, run, stress_noise, toml
 
 COLUMN_DX, BLOCK_DX, SLOPE_DX = 0.004, 0.08, 0.5
 
 
 def column(result):
-    m = v_exp_1.measure(result, 4)
+    m = aluminium_bars.measure(result, 4)
     return {
         "x at 5 mm (mm)": m["toe"],
         "height at 100 mm (mm)": float(np.interp(100.0, m["at"], m["height"])),
@@ -30,19 +30,19 @@ def column(result):
 
 
 def block(result):
-    m = v_exp_5.measure(result, BLOCK_DX)
+    m = cohesive_block.measure(result, BLOCK_DX)
     return {"crest drop (m)": m["drop"], "clumped (%)": m["clumped"], "stress noise": stress_noise(result.snapshot(), BLOCK_DX, 1850.0)}
 
 
 def slope(result):
-    m = v_exp_4.measure(result)
+    m = slope_safety.measure(result)
     return {"moved since release (mm)": 1e3 * m["end"], "stress noise": stress_noise(result.snapshot(), SLOPE_DX, 2039.0)}
 
 
 SCENES = {
-    "column": (v_exp_1.scene(4, **{"output.every": 0.2}), column),
-    "block": (v_exp_5.scene(0.5, BLOCK_DX), block),
-    "slope": (v_exp_4.scene(1.0, "plane strain, no dilation", 20, **{"output.fields": None}), slope),
+    "column": (aluminium_bars.scene(4, **{"output.every": 0.2}), column),
+    "block": (cohesive_block.scene(0.5, BLOCK_DX), block),
+    "slope": (slope_safety.scene(1.0, "plane strain, no dilation", 20, **{"output.fields": None}), slope),
 }
 
 # Effect: {scene: (changes that leave it out, changes that put it in)}. Changes are relative to the scene as it stands.

@@ -121,9 +121,9 @@ def draw_closed_forms():
     column = os.path.join(RESULTS, "SPH-7_stress.csv")
     if os.path.exists(column):
         drawn["SPH-7"] = figure(
-            "sph_7_column",
+            "column_at_rest",
             f"""set xlabel 'stress (kPa)'; set ylabel 'height (m)'; set key left top
-set title 'SPH-7: elastic column at rest, 10 and 50 spacings'
+set title 'elastic column at rest, 10 and 50 spacings'
 plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' title 'closed form, -rho g d', \\
   '' every ::1 using ($1==10?$3/1e3:NaN):2 pt 7 ps 1.0 lc rgb '{COLOURS[1]}' title 'sigma_z, 10 spacings', \\
   '' every ::1 using ($1==50?$3/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[0]}' title 'sigma_z, 50 spacings', \\
@@ -139,9 +139,9 @@ plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' titl
             for k, ((n, c), p) in enumerate(sorted(tips.items()))
         )
         drawn["SPH-5"] = figure(
-            "sph_5_plate",
+            "swinging_plate",
             f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key center bottom
-set title 'SPH-5: plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
+set title 'plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
 set arrow from 0.127,graph 0 to 0.127,graph 1 nohead dt 2; set label 'T/2' at 0.129,graph 0.95
 plot {lines}
 """,

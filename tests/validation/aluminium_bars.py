@@ -137,7 +137,7 @@ def measure(result, mm):
 def record_gates(case, m, mm, gate=True):
     """The gates; at a spacing too coarse for them, or for information, without a verdict."""
     tag = f"spacing {mm:g} mm: "
-    more = {"seconds": m["seconds"], "figure": "v_exp_1_profile.png"}
+    more = {"seconds": m["seconds"], "figure": "aluminium_bars_profile.png"}
     for surface_by, error, toe, note in (
         ("volume", m["error"], m["toe"], f"99.9 % of the soil within {m['front']:.0f} mm"),
         ("highest bars", m["error_top"], m["toe_top"], "single bars on the toe count in full"),
@@ -201,7 +201,7 @@ def draw(case, runs):
         f"'{folder}experiment-failure.csv' every ::1 u 1:2 w p pt 6 ps 0.9 lc rgb 'black' t 'experiment, failure line'",
     ]
     figure(
-        "v_exp_1_profile",
+        "aluminium_bars_profile",
         """set xlabel 'x (mm)'; set ylabel 'height (mm)'; set xrange [0:500]; set yrange [0:120]; set key top right
 set title 'Collapse of aluminium bars: surface (full) and failure line (dashed)'
 plot """
@@ -235,7 +235,7 @@ def main(quick=False, slow=False):
             "%",
             seconds=m["seconds"],
             note=f"5 mm high at {m['toe']:.0f} mm, failure line {m['line']:.1f} mm off",
-            figure="v_exp_1_profile.png",
+            figure="aluminium_bars_profile.png",
         )
         shown.append((f"{label}, {mm:g} mm", f"{name}-{mm}mm", m))
     draw(case, shown)

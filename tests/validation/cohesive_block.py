@@ -118,7 +118,7 @@ def draw(case, with_stress, without):
         file = case.curve(f"particles-{name}", x_m=m["points"][:, 0], z_m=m["points"][:, 1], plastic_strain=m["strain"])
         panels.append(f"set title '{title}'; plot '{file}' every ::1 u 1:2:($3>2?2:$3) w p pt 7 ps 0.5 lc palette notitle")
     figure(
-        "v_exp_5_block",
+        "cohesive_block",
         """set multiplot layout 2,1
 set size ratio -1; set xrange [1.8:5.3]; set yrange [0:2.1]; set cbrange [0:2]; set ylabel 'z (m)'; set xlabel 'x (m)'; set cblabel 'plastic shear strain'
 set palette defined (0 '#30307a', 0.5 '#2a9d8f', 1 '#e9c46a', 2 '#d1495b'); set ytics 0.5
@@ -138,7 +138,7 @@ def main(quick=False, slow=False):
     else:
         dx = 0.04
         good, bad = (measure(run(scene(eps, dx), "V-EXP-5", f"eps-{eps:g}"), dx) for eps in (0.5, 0.0))
-    more = {"seconds": good["seconds"], "figure": "v_exp_5_block.png"}
+    more = {"seconds": good["seconds"], "figure": "cohesive_block.png"}
     tag = f"eps 0.5, spacing {dx * 1e3:g} mm: "
     case.record(
         tag + "connected components", 1, good["components"], "1", "= 1", good["components"] == 1, note="joined up to 1.5 spacings", **more
@@ -197,7 +197,7 @@ def main(quick=False, slow=False):
         "% clumped",
         note=f"least distance {bad['spacing']:.3f} spacings, {bad['components']} components",
         seconds=bad["seconds"],
-        figure="v_exp_5_block.png",
+        figure="cohesive_block.png",
     )
     if not quick:
         double = measure(run(scene(1.0), "V-EXP-5", "eps-1"))

@@ -122,7 +122,7 @@ def gate_at_2(m):
 
 
 def record_gate_at_2(case, m):
-    more = {"seconds": m["seconds"], "figure": "v_exp_3_runout.png"}
+    more = {"seconds": m["seconds"], "figure": "collapsing_columns_runout.png"}
     case.record(
         "plane, a = 2: gate on the run-out",
         "2.40 to 3.60",
@@ -193,7 +193,7 @@ def sweep(case, kind, aspects):
             seconds=m["seconds"],
             note=f"outermost grain {m['runout_history']:.2f}, height {m['height']:.2f}, kinetic energy {m['moving']:.1e} of its peak, "
             f"energy residual {m['residual']:.3f} %, {m['particles']} particles",
-            figure="v_exp_3_runout.png",
+            figure="collapsing_columns_runout.png",
         )
     case.curve(f"{kind}", **{k: np.array([m[k] for m in rows]) for k in ("a", "runout", "runout_history", "height", "moving", "seconds")})
     for m in rows:
@@ -210,7 +210,7 @@ def sweep(case, kind, aspects):
             abs(e - power) <= 0.15,
             note="fitted to a = " + ", ".join(f"{m['a']:g}" for m in part),
             seconds=sum(m["seconds"] for m in part),
-            figure="v_exp_3_runout.png",
+            figure="collapsing_columns_runout.png",
         )
     return rows
 
@@ -235,7 +235,7 @@ def draw(case, swept):
             )
     rows_of_panels = len(swept)
     figure(
-        "v_exp_3_runout",
+        "collapsing_columns_runout",
         f"set multiplot layout {rows_of_panels},2\nset logscale xy; set xrange [0.4:25]; set xlabel 'aspect ratio a = H0/L0'\n"
         "set key bottom right font ',9' spacing 1\n" + "\n".join(panels) + "\nunset multiplot\n",
         size=(980, 420 * rows_of_panels),

@@ -116,7 +116,7 @@ def draw(case, swept):
         file = case.curve(f"time-{m['srf']:.4f}", time_s=m["time"], displacement_m=m["d"])
         times.append(f"'{file}' every ::1 u 1:($2>0?$2:1/0) w l lw 1.8 lc rgb '{colour}' t 'SRF {m['srf']:.3f}'")
     figure(
-        "v_exp_4_slope",
+        "slope_safety",
         f"""set multiplot layout 1,2
 set logscale y; set format y '10^{{%L}}'; set ylabel 'greatest displacement {FREE:g} s after damping (m)'; set xlabel 'strength reduction factor SRF'
 set xrange [1.15:2.05]; set yrange [1e-4:100]; set key top left font ',9'; set title 'Slope of Griffiths and Lane, example 1'
@@ -180,7 +180,7 @@ def main(quick=False, slow=False):
             seconds=sum(m["seconds"] for m in done),
             note=f"reference: {'chart (Bishop-Morgenstern)' if cone == psi0 else 'predicted from the chart and the cone'}; "
             f"slides more than 0.05 H at SRF {slides(done):.3f}; {len(done)} runs",
-            figure="v_exp_4_slope.png",
+            figure="slope_safety.png",
         )
     case.control(
         "compression cone against the chart's 1.38: factor of safety outside 3 %",
@@ -207,7 +207,7 @@ def main(quick=False, slow=False):
         3,
         seconds=sum(m["seconds"] for m in done),
         note=f"drift from H/dx 20: {fine - fos[psi0]:+.4f}; slides more than 0.05 H at SRF {slides(done):.3f}",
-        figure="v_exp_4_slope.png",
+        figure="slope_safety.png",
     )
     # Hard case H13: a slope far from failure must not creep, whatever the kernel.
     for label, changes in (
