@@ -9,6 +9,7 @@
     perf/scaling.py serial    time of each phase with 1 and 2 threads, and the serial share that they tell (needs a quiet machine)
     perf/scaling.py plot      docs/figures/scaling.svg and cut.svg from build/scaling/*.json
 Answers are Markdown; the numbers stay in build/scaling. The program is build/release/kuzure, or --program PATH."""
+# Beyond 400 lines: one function a figure.
 import argparse
 import json
 import os

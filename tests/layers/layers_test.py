@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Includes point one way. Run as layers_test.py PROGRAM (which is not used); exits 1 and names file and line of what breaks a rule."""
+"""Includes point one way, and files have one job: a long one says why it is. Run as layers_test.py PROGRAM (which is not used); exits 1 and names file and line of what breaks a rule."""
 import re
 import subprocess
 import sys
@@ -56,6 +56,12 @@ FOREIGN = [
 FOLDERS = {"solver", "decomposition", "io", "perf", "jobs", "tests", "docs", "cmake"}
 GENERATED = {"build", "results"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+# A file of more lines than this says at its top why, in words that begin so.
+LONG, REASON = 420, "beyond 400 lines:"
+# Long without a reason; a file leaves this list as it is split, and none comes in.
+TO_SPLIT = {"solver/scene/check.cpp", "solver/scene/fill.cpp"}
 
 
 def inside(path, place):
@@ -121,6 +127,19 @@ def violations(root, top_level):
                         yield f"{path}:{k}: comes to {chain[-1]} through {' -> '.join(chain[:-1])}"
 
 
+def too_long(root, to_split):
+    for folder in sorted(FOLDERS):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix not in (".hpp", ".cpp", ".py", ".sh") or not file.is_file():
+                continue
+            path, lines = file.relative_to(root).as_posix(), file.read_text(errors="replace").splitlines()
+            good = len(lines) <= LONG or any(REASON in line.lower() for line in lines[:40])
+            if good and path in to_split:
+                yield f"{path}: no longer too long: take it from the list of this test"
+            if not good and path not in to_split:
+                yield f"{path}:{len(lines)}: longer than {LONG} lines: split it, or say at its top why it is one file: // Beyond 400 lines: ..."
+
+
 def top_level_folders(root):
     """Folders that git keeps; without git, those that are there."""
     try:
@@ -181,7 +200,12 @@ def check_the_check():
             (root / path).write_text(text)
         (root / "misc").mkdir()
         said = list(violations(root, {entry.name for entry in root.iterdir()}))
+        for name, top in (("long", ""), ("reason", "// Beyond 400 lines: one table.\n"), ("listed", "")):
+            (root / f"io/{name}.cpp").write_text(top + "\n" * LONG + "int x;\n")
+        long = [line.split(":")[0] for line in too_long(root, {"io/listed.cpp", "io/file.cpp"})]
     wrong = []
+    if long != ["io/file.cpp", "io/long.cpp"]:
+        wrong.append(f"self-check: the long files found are {long}")
     for path, (_, expected) in PLANTED.items():
         about = [line for line in said if re.match(re.escape(path) + ":", line)]
         if (not expected and about) or (expected and not any(expected in line for line in about)):
@@ -192,7 +216,7 @@ def check_the_check():
 
 
 def main():
-    wrong = check_the_check() or list(violations(ROOT, top_level_folders(ROOT)))
+    wrong = check_the_check() or [*violations(ROOT, top_level_folders(ROOT)), *too_long(ROOT, TO_SPLIT)]
     print("\n".join(wrong) if wrong else f"includes point one way in {len(sources(ROOT))} files")
     return 1 if wrong else 0
 

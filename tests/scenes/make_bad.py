@@ -2,6 +2,7 @@
 """Writes tests/scenes/bad/*.toml: a good scene broken once a file, with the message expected as a regular expression in
 the first line, and tests/scenes/doubtful/*.toml: scenes that are accepted with the warning expected there. The files are
 kept in the repository; run this after adding a case. tests/unit/scene_file_test.cpp reads them."""
+# Beyond 400 lines: a table, one entry a bad scene.
 import pathlib
 
 GOOD = """title = "a good scene"
