@@ -29,6 +29,8 @@ RasterInfo tiff_info(const Path&);
 Raster read_tiff(const Path&, const std::optional<Window>&);
 RasterInfo ascii_info(const Path&);
 Raster read_ascii(const Path&, const std::optional<Window>&);
+RasterInfo jpgis_info(const Path&);
+Raster read_jpgis(const Path&, const std::optional<Window>&);
 
 /// The text of the .prj beside a file as WKT; empty where there is none. Throws BadInput.
 std::string crs_beside(const Path& file);

@@ -87,7 +87,7 @@ std::string crs_beside(const Path& file)
 
 namespace {
 
-enum class Format { Tiff, Ascii };
+enum class Format { Tiff, Ascii, Jpgis };
 
 Format format_of(const Path& path)
 {
@@ -102,6 +102,7 @@ Format format_of(const Path& path)
     const auto n = ::read(in, start.data(), start.size());
     start.resize(std::size_t(std::max<ssize_t>(n, 0)));
     if (start.starts_with("II") || start.starts_with("MM")) return Format::Tiff;
+    if (start.starts_with("PK\x03\x04") || start.find("<?xml") < 8) return Format::Jpgis;
     std::string lower;
     for (const char c : start) lower += char(std::tolower((unsigned char)(c)));
     const auto at = lower.find_first_not_of(" \t\r\n");
@@ -123,6 +124,8 @@ RasterInfo raster_info(const Path& path)
         return ground::tiff_info(path);
     case ground::Format::Ascii:
         return ground::ascii_info(path);
+    case ground::Format::Jpgis:
+        return ground::jpgis_info(path);
     }
     return {};
 }
@@ -135,6 +138,8 @@ Raster read_raster(const Path& path, const std::optional<Window>& window)
         return ground::read_tiff(path, window);
     case ground::Format::Ascii:
         return ground::read_ascii(path, window);
+    case ground::Format::Jpgis:
+        return ground::read_jpgis(path, window);
     }
     return {};
 }
