@@ -1,8 +1,9 @@
 #include "io/ground/crs.hpp"
 #include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #if KUZURE_TERRAIN
-#include <cmath>
 #include <limits>
 #include <proj.h>
 #include <proj_experimental.h>
@@ -24,6 +25,12 @@ void need_terrain(const std::string& who)
     if (!has_terrain())
         throw BadInput(who + ": this kuzure was built without maps. Remedy: run jobs/install.sh (Debian: libtiff-dev libgeotiff-dev "
                              "libproj-dev libshp-dev libpugixml-dev libarchive-dev) and build again with -D KUZURE_TERRAIN=ON");
+}
+
+std::string utm_zone(double longitude, double latitude)
+{
+    const int zone = std::clamp(int(std::floor((longitude + 180) / 6)) + 1, 1, 60);
+    return fmt::format("EPSG:{}", (latitude < 0 ? 32700 : 32600) + zone);
 }
 
 #if KUZURE_TERRAIN
@@ -170,6 +177,20 @@ bool same_crs(const std::string& a, const std::string& b)
     return !said.empty() && said == numbers(q);
 }
 
+bool lies_in(const std::string& wkt, double x, double y)
+{
+    const Context c = context();
+    const Pj p = made(c.get(), wkt);
+    double west = 0, south = 0, east = 0, north = 0;
+    if (!proj_get_area_of_use(c.get(), p.get(), &west, &south, &east, &north, nullptr) || west == -1000 || west > east) return true;
+    const Pj way(proj_create_crs_to_crs(c.get(), wkt.c_str(), "EPSG:4326", nullptr));
+    const Pj plain(way ? proj_normalize_for_visualization(c.get(), way.get()) : nullptr);
+    if (!plain) return true;
+    const PJ_COORD at = proj_trans(plain.get(), PJ_FWD, proj_coord(x, y, 0, HUGE_VAL));
+    const double margin = 2;
+    return at.xy.x >= west - margin && at.xy.x <= east + margin && at.xy.y >= south - margin && at.xy.y <= north + margin;
+}
+
 std::string esri_wkt(const std::string& wkt)
 {
     const Context c = context();
@@ -224,6 +245,7 @@ int epsg_of(const std::string&) { return 0; }
 bool is_geographic(const std::string&) { return false; }
 double metres_per_unit(const std::string&) { return 1; }
 bool same_crs(const std::string& a, const std::string& b) { return a == b; }
+bool lies_in(const std::string&, double, double) { return true; }
 std::string esri_wkt(const std::string& wkt) { return wkt; }
 struct Transform::Handle {};
 Transform::Transform(const std::string&, const std::string&, const std::string& who) { need_terrain(who); }
