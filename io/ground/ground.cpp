@@ -420,6 +420,10 @@ private:
                 for (double& x : t)
                     if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
             } else {
+                // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
+                for_each_cell([&](int i, int j, std::size_t k) {
+                    if (t[k] == 0 && !in(m, i, j)) t[k] = none;
+                });
                 extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
             }
         }
