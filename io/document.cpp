@@ -101,10 +101,17 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
         return wrong_numbers(key, node, 3);
     case Kind::Pair:
         return wrong_numbers(key, node, 2);
+    case Kind::Window:
+        return wrong_numbers(key, node, 4);
     case Kind::Points:
         if (!node.is_array()) return unless(false);
         for (const auto& point : *node.as_array())
             if (auto wrong = wrong_numbers(key, point, 2)) return Mismatch{wrong->found + " as a corner", {}};
+        return {};
+    case Kind::Numbers:
+        if (!node.is_array()) return unless(false);
+        for (const auto& element : *node.as_array())
+            if (auto wrong = wrong_number(key, element)) return Mismatch{wrong->found + " among them", wrong->remedy};
         return {};
     case Kind::Choice:
         return wrong_choice(key, node);
@@ -119,6 +126,10 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
         return unless(node.is_string() || node.value_or(false));
     case Kind::Named:
         return unless(node.is_table() && !node.as_table()->empty());
+    case Kind::TextOrTexts:
+        if (node.is_string()) return unless(not_one_line(node.as_string()->get()).empty());
+        if (node.is_array() && node.as_array()->empty()) return unless(false);
+        [[fallthrough]];
     case Kind::Texts:
         if (!node.is_array()) return unless(false);
         for (const auto& element : *node.as_array())

@@ -52,6 +52,12 @@ public:
         add(path, Kind::Vector, k).need = Need::Optional;
     }
     void pair(const std::string& path, const std::array<double, 2>&, const KeyInfo& k) { add(path, Kind::Pair, k); }
+    void numbers(const std::string& path, const std::vector<double>&, const KeyInfo& k) { add(path, Kind::Numbers, k); }
+    void files(const std::string& path, const std::vector<std::string>&, const KeyInfo& k) { add(path, Kind::TextOrTexts, k); }
+    void window(const std::string& path, const std::optional<std::array<double, 4>>&, const KeyInfo& k)
+    {
+        add(path, Kind::Window, k).need = Need::Optional;
+    }
     void points(const std::string& path, const std::vector<std::array<double, 2>>&, const KeyInfo& k) { add(path, Kind::Points, k); }
     void axes(const std::string& path, const std::array<bool, 3>&, const KeyInfo& k)
     {
@@ -78,6 +84,10 @@ public:
         add(path, Kind::Table, k).need = Need::Optional;
         T value{};
         describe(path, value);
+    }
+    template <class T, class Describe> void part(const std::string& path, const std::optional<T>& to, const KeyInfo& k, Describe describe)
+    {
+        table(path, to, k, describe);
     }
     template <class T, class Describe>
     void automatic(const std::string& path, const std::optional<T>& to, scene::Decision, const KeyInfo& k, Describe describe)

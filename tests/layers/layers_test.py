@@ -51,6 +51,7 @@ FOREIGN = [
     (r"(par)?metis\.h", "decomposition", "deep"),
     (r"(hdf5(_hl)?|H5\w+)\.h", "io", "deep"),
     (r"toml\+\+/.*|toml\.hpp", "io", "deep"),
+    (r"(proj\w*|x?tiffio|geo\w+|shapefil|archive\w*)\.h|pugixml\.hpp", "io/ground", "deep"),
     (r".*intrin\.h|arm_(neon|sve)\.h|experimental/simd", "solver/core/simd.hpp", "direct"),
 ]
 FOLDERS = {"solver", "decomposition", "io", "perf", "jobs", "tests", "docs", "cmake"}

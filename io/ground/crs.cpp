@@ -1,0 +1,259 @@
+#include "io/ground/crs.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#if KUZURE_TERRAIN
+#include <limits>
+#include <proj.h>
+#include <proj_experimental.h>
+#endif
+
+namespace kuzure::io {
+
+bool has_terrain()
+{
+#if KUZURE_TERRAIN
+    return true;
+#else
+    return false;
+#endif
+}
+
+void need_terrain(const std::string& who)
+{
+    if (!has_terrain())
+        throw BadInput(who + ": this kuzure was built without maps. Remedy: run jobs/install.sh (Debian: libtiff-dev libgeotiff-dev "
+                             "libproj-dev libshp-dev libpugixml-dev libarchive-dev) and build again with -D KUZURE_TERRAIN=ON");
+}
+
+std::string utm_zone(double longitude, double latitude)
+{
+    const int zone = std::clamp(int(std::floor((longitude + 180) / 6)) + 1, 1, 60);
+    return fmt::format("EPSG:{}", (latitude < 0 ? 32700 : 32600) + zone);
+}
+
+#if KUZURE_TERRAIN
+namespace {
+
+struct FreeContext {
+    void operator()(PJ_CONTEXT* c) const { proj_context_destroy(c); }
+};
+struct FreePj {
+    void operator()(PJ* p) const { proj_destroy(p); }
+};
+using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
+using Pj = std::unique_ptr<PJ, FreePj>;
+
+Context context()
+{
+    Context c(proj_context_create());
+    proj_log_level(c.get(), PJ_LOG_NONE);
+    proj_context_set_enable_network(c.get(), 0); // the same answer everywhere
+    return c;
+}
+
+bool is_crs(const Pj& p) { return p && proj_is_crs(p.get()); }
+
+/// The part of a system that says where in plan: without heights, and without a way to another datum.
+Pj horizontal(PJ_CONTEXT* c, Pj p)
+{
+    for (int k = 0; k < 4 && p; ++k) {
+        const auto type = proj_get_type(p.get());
+        if (type == PJ_TYPE_COMPOUND_CRS) p.reset(proj_crs_get_sub_crs(c, p.get(), 0));
+        else if (type == PJ_TYPE_BOUND_CRS) p.reset(proj_get_source_crs(c, p.get()));
+        else if (type == PJ_TYPE_GEOGRAPHIC_3D_CRS) p.reset(proj_crs_demote_to_2D(c, nullptr, p.get()));
+        else break;
+    }
+    return p;
+}
+
+std::string wkt_of(PJ_CONTEXT* c, const PJ* p, PJ_WKT_TYPE type = PJ_WKT2_2019)
+{
+    const char* const options[] = {"MULTILINE=NO", nullptr};
+    const char* text = proj_as_wkt(c, p, type, options);
+    return text ? text : "";
+}
+
+/// EPSG's own system where this one is the same and says so with confidence.
+Pj known(PJ_CONTEXT* c, Pj p)
+{
+    if (const char* id = proj_get_id_code(p.get(), 0); id && *id) return p;
+    int* confidence = nullptr;
+    PJ_OBJ_LIST* found = proj_identify(c, p.get(), "EPSG", nullptr, &confidence);
+    Pj best;
+    if (found && proj_list_get_count(found) > 0 && confidence[0] >= 90) best.reset(proj_list_get(c, found, 0));
+    proj_int_list_destroy(confidence);
+    proj_list_destroy(found);
+    return best ? std::move(best) : std::move(p);
+}
+
+Pj made(PJ_CONTEXT* c, const std::string& wkt)
+{
+    Pj p(proj_create(c, wkt.c_str()));
+    ensure(is_crs(p), "a coordinate system is no WKT");
+    return p;
+}
+
+bool geographic(const Pj& p)
+{
+    const auto type = proj_get_type(p.get());
+    return type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
+}
+
+} // namespace
+
+std::string crs_from(const std::string& text, const std::string& who)
+{
+    const Context c = context();
+    Pj p(proj_create(c.get(), text.c_str()));
+    if (!is_crs(p) && text.find("+proj=") != text.npos && text.find("+type=crs") == text.npos)
+        p.reset(proj_create(c.get(), (text + " +type=crs").c_str()));
+    const auto shown = text.substr(0, 80);
+    if (!is_crs(p))
+        throw BadInput(fmt::format("{}: expected a coordinate system, found \"{}\". Remedy: name it by its EPSG number, as "
+                                   "\"EPSG:6670\" (epsg.io finds it)",
+                                   who, shown));
+    p = horizontal(c.get(), std::move(p));
+    const auto type = is_crs(p) ? proj_get_type(p.get()) : PJ_TYPE_UNKNOWN;
+    if (type != PJ_TYPE_PROJECTED_CRS && type != PJ_TYPE_GEOGRAPHIC_2D_CRS)
+        throw BadInput(fmt::format("{}: expected a projected or geographic coordinate system, found \"{}\", which does not say where in "
+                                   "plan. Remedy: name the map's system by its EPSG number, as \"EPSG:6670\"",
+                                   who, shown));
+    return wkt_of(c.get(), known(c.get(), std::move(p)).get());
+}
+
+std::string crs_name(const std::string& wkt)
+{
+    const Context c = context();
+    const Pj p = made(c.get(), wkt);
+    const char* code = proj_get_id_code(p.get(), 0);
+    return code ? fmt::format("{} ({}:{})", proj_get_name(p.get()), proj_get_id_auth_name(p.get(), 0), code) : proj_get_name(p.get());
+}
+
+int epsg_of(const std::string& wkt)
+{
+    const Context c = context();
+    const Pj p = made(c.get(), wkt);
+    const char *code = proj_get_id_code(p.get(), 0), *authority = proj_get_id_auth_name(p.get(), 0);
+    return code && authority && std::string(authority) == "EPSG" ? std::atoi(code) : 0;
+}
+
+bool is_geographic(const std::string& wkt)
+{
+    const Context c = context();
+    return geographic(made(c.get(), wkt));
+}
+
+double metres_per_unit(const std::string& wkt)
+{
+    const Context c = context();
+    const Pj p = made(c.get(), wkt);
+    if (geographic(p)) return 0;
+    const Pj axes(proj_crs_get_coordinate_system(c.get(), p.get()));
+    double factor[2] = {0, 0};
+    for (int k = 0; k < 2; ++k)
+        if (!axes || !proj_cs_get_axis_info(c.get(), axes.get(), k, nullptr, nullptr, nullptr, &factor[k], nullptr, nullptr, nullptr))
+            return 0;
+    return factor[0] == factor[1] ? factor[0] : 0;
+}
+
+bool same_crs(const std::string& a, const std::string& b)
+{
+    if (a == b) return true;
+    if (a.empty() || b.empty()) return false;
+    const Context c = context();
+    // Compared as they are used: x to the east, y to the north.
+    const auto plain = [&](const std::string& wkt) { return Pj(proj_normalize_for_visualization(c.get(), made(c.get(), wkt).get())); };
+    const Pj p = plain(a), q = plain(b);
+    if (p && q && proj_is_equivalent_to_with_ctx(c.get(), p.get(), q.get(), PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS)) return true;
+    // Without a datum's name its numbers count.
+    if (!p || !q || (a.find("nknown") == a.npos && b.find("nknown") == b.npos)) return false;
+    const auto numbers = [&](const Pj& x) {
+        const char* text = proj_as_proj_string(c.get(), x.get(), PJ_PROJ_5, nullptr);
+        return std::string(text ? text : "");
+    };
+    const auto said = numbers(p);
+    return !said.empty() && said == numbers(q);
+}
+
+bool lies_in(const std::string& wkt, double x, double y)
+{
+    const Context c = context();
+    const Pj p = made(c.get(), wkt);
+    double west = 0, south = 0, east = 0, north = 0;
+    if (!proj_get_area_of_use(c.get(), p.get(), &west, &south, &east, &north, nullptr) || west == -1000 || west > east) return true;
+    const Pj way(proj_create_crs_to_crs(c.get(), wkt.c_str(), "EPSG:4326", nullptr));
+    const Pj plain(way ? proj_normalize_for_visualization(c.get(), way.get()) : nullptr);
+    if (!plain) return true;
+    const PJ_COORD at = proj_trans(plain.get(), PJ_FWD, proj_coord(x, y, 0, HUGE_VAL));
+    const double margin = 2;
+    return at.xy.x >= west - margin && at.xy.x <= east + margin && at.xy.y >= south - margin && at.xy.y <= north + margin;
+}
+
+std::string esri_wkt(const std::string& wkt)
+{
+    const Context c = context();
+    auto text = wkt_of(c.get(), made(c.get(), wkt).get(), PJ_WKT1_ESRI);
+    return text.empty() ? wkt : text;
+}
+
+struct Transform::Handle {
+    Context c;
+    Pj p;
+};
+
+Transform::Transform(const std::string& from, const std::string& to, const std::string& who) : handle_(std::make_unique<Handle>())
+{
+    handle_->c = context();
+    auto* c = handle_->c.get();
+    // A "ballpark" way leaves the difference of the datums out, which may be hundreds of metres.
+    const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
+    const Pj a = made(c, from), b = made(c, to);
+    const Pj way(proj_create_crs_to_crs_from_pj(c, a.get(), b.get(), nullptr, options));
+    if (way) handle_->p.reset(proj_normalize_for_visualization(c, way.get()));
+    if (!handle_->p)
+        throw BadInput(fmt::format("{}: no exact way is known from its coordinate system, {}, to {}. Remedy: project the file first, for "
+                                   "instance with gdalwarp or ogr2ogr -t_srs",
+                                   who, crs_name(from), crs_name(to)));
+}
+Transform::Transform(Transform&&) noexcept = default;
+Transform::~Transform() = default;
+
+namespace {
+std::array<double, 2> moved(PJ* p, PJ_DIRECTION direction, double x, double y)
+{
+    const PJ_COORD at = proj_trans(p, direction, proj_coord(x, y, 0, HUGE_VAL));
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    if (!std::isfinite(at.xy.x) || !std::isfinite(at.xy.y)) return {none, none};
+    return {at.xy.x, at.xy.y};
+}
+} // namespace
+
+std::array<double, 2> Transform::operator()(double x, double y) const { return moved(handle_->p.get(), PJ_FWD, x, y); }
+std::array<double, 2> Transform::back(double x, double y) const { return moved(handle_->p.get(), PJ_INV, x, y); }
+
+#else
+
+std::string crs_from(const std::string&, const std::string& who)
+{
+    need_terrain(who);
+    return "";
+}
+std::string crs_name(const std::string& wkt) { return wkt; }
+int epsg_of(const std::string&) { return 0; }
+bool is_geographic(const std::string&) { return false; }
+double metres_per_unit(const std::string&) { return 1; }
+bool same_crs(const std::string& a, const std::string& b) { return a == b; }
+bool lies_in(const std::string&, double, double) { return true; }
+std::string esri_wkt(const std::string& wkt) { return wkt; }
+struct Transform::Handle {};
+Transform::Transform(const std::string&, const std::string&, const std::string& who) { need_terrain(who); }
+Transform::Transform(Transform&&) noexcept = default;
+Transform::~Transform() = default;
+std::array<double, 2> Transform::operator()(double x, double y) const { return {x, y}; }
+std::array<double, 2> Transform::back(double x, double y) const { return {x, y}; }
+
+#endif
+
+} // namespace kuzure::io
