@@ -175,6 +175,11 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
         for (const auto& point : *node.as_array())
             if (auto wrong = wrong_numbers(key, point, 2)) return Mismatch{wrong->found + " as a corner", {}};
         return {};
+    case Kind::Numbers:
+        if (!node.is_array()) return unless(false);
+        for (const auto& element : *node.as_array())
+            if (auto wrong = wrong_number(key, element)) return Mismatch{wrong->found + " among them", wrong->remedy};
+        return {};
     case Kind::Choice:
         return wrong_choice(key, node);
     case Kind::Choices:

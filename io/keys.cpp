@@ -35,6 +35,8 @@ std::string Key::expected() const
         return "two numbers [from, to]" + of_unit;
     case Kind::Points:
         return "an array of corners [x, z]" + of_unit;
+    case Kind::Numbers:
+        return "an array of numbers" + of_unit + limits;
     case Kind::Choice:
         return (choices.size() > 1 ? "one of " : "") + one_of();
     case Kind::Choices:

@@ -17,6 +17,7 @@ enum class Kind {
     Vector,        // [x, y, z]
     Pair,          // [from, to]
     Points,        // [[x, z], ...]
+    Numbers,       // an array of numbers
     Choice,        // one of the choices
     Choices,       // an array of them, each at most once
     ChoiceOrTable, // one of the choices, or a table of keys

@@ -39,7 +39,10 @@ public:
     }
     void integer(const std::string& path, int& to, const KeyInfo&) { to = file_.integer(path); }
     void flag(const std::string& path, bool& to, const KeyInfo&) { to = file_.at(path).as_boolean()->get(); }
-    void number(const std::string& path, double& to, const KeyInfo&) { to = file_.number(path); }
+    void number(const std::string& path, double& to, const KeyInfo& k)
+    {
+        if (!k.optional || file_.find(path)) to = file_.number(path);
+    }
     void number(const std::string& path, std::optional<double>& to, const KeyInfo& k)
     {
         optionally(path, to, [&](double& x) { number(path, x, k); });
@@ -57,6 +60,10 @@ public:
     void pair(const std::string& path, std::array<double, 2>& to, const KeyInfo&)
     {
         if (const auto* n = file_.find(path)) to = {number_of(*n->as_array()->get(0)), number_of(*n->as_array()->get(1))};
+    }
+    void numbers(const std::string& path, std::vector<double>& to, const KeyInfo&)
+    {
+        for (const auto& x : *file_.at(path).as_array()) to.push_back(number_of(x));
     }
     void points(const std::string& path, std::vector<std::array<double, 2>>& to, const KeyInfo&)
     {
@@ -85,6 +92,10 @@ public:
     template <class T, class Describe> void table(const std::string& path, std::optional<T>& to, const KeyInfo&, Describe describe)
     {
         optionally(path, to, [&](T& value) { describe(path, value); });
+    }
+    template <class T, class Describe> void part(const std::string& path, std::optional<T>& to, const KeyInfo& k, Describe describe)
+    {
+        table(path, to, k, describe);
     }
     template <class T, class Describe>
     void automatic(const std::string& path, std::optional<T>& to, scene::Decision& decision, const KeyInfo& k, Describe describe)
@@ -149,9 +160,11 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
     describe(reader, scene);
     file.throw_if_any();
     // Paths count from the scene file's directory.
-    if (!scene.start.from.empty())
-        scene.start.from =
-            std::filesystem::absolute(std::filesystem::path(name).parent_path() / scene.start.from).lexically_normal().string();
+    const auto absolute = [&](std::string& path) {
+        if (!path.empty()) path = std::filesystem::absolute(std::filesystem::path(name).parent_path() / path).lexically_normal().string();
+    };
+    absolute(scene.start.from);
+    if (scene.maps) absolute(scene.maps->points);
 
     scene::resolve(scene);
     scene::Issues issues;

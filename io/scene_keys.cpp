@@ -52,6 +52,7 @@ public:
         add(path, Kind::Vector, k).need = Need::Optional;
     }
     void pair(const std::string& path, const std::array<double, 2>&, const KeyInfo& k) { add(path, Kind::Pair, k); }
+    void numbers(const std::string& path, const std::vector<double>&, const KeyInfo& k) { add(path, Kind::Numbers, k); }
     void points(const std::string& path, const std::vector<std::array<double, 2>>&, const KeyInfo& k) { add(path, Kind::Points, k); }
     void axes(const std::string& path, const std::array<bool, 3>&, const KeyInfo& k)
     {
@@ -78,6 +79,10 @@ public:
         add(path, Kind::Table, k).need = Need::Optional;
         T value{};
         describe(path, value);
+    }
+    template <class T, class Describe> void part(const std::string& path, const std::optional<T>& to, const KeyInfo& k, Describe describe)
+    {
+        table(path, to, k, describe);
     }
     template <class T, class Describe>
     void automatic(const std::string& path, const std::optional<T>& to, scene::Decision, const KeyInfo& k, Describe describe)

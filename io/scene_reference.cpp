@@ -34,6 +34,8 @@ std::string shown_value(const Key& key)
         return "[from, to]";
     case Kind::Points:
         return "[[x, z], ...]";
+    case Kind::Numbers:
+        return "array of numbers";
     case Kind::Choice:
         return words();
     case Kind::Choices:
@@ -117,6 +119,8 @@ Json value_schema(const Key& key)
         return array_of(number_schema(key, "number"), 2, 2);
     case Kind::Points:
         return array_of(array_of(number_schema(key, "number"), 2, 2), 0);
+    case Kind::Numbers:
+        return array_of(number_schema(key, "number"), 0);
     case Kind::Choice:
         return {{"enum", key.choices}};
     case Kind::Choices: {

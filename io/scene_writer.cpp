@@ -68,7 +68,7 @@ public:
     {
         if (on || purpose_ == Purpose::File) emit(path, on ? "true" : "false");
     }
-    void number(const std::string& path, double x, const KeyInfo&) { emit(path, digits(x)); }
+    void number(const std::string& path, double x, const KeyInfo& k) { k.optional&& x == 0 ? absent(path) : emit(path, digits(x)); }
     void number(const std::string& path, const std::optional<double>& x, const KeyInfo& k) { x ? number(path, *x, k) : absent(path); }
     void angle(const std::string& path, double x, const KeyInfo&) { emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x)); }
     void vector(const std::string& path, const Vector& v, const KeyInfo&)
@@ -79,6 +79,12 @@ public:
     void pair(const std::string& path, const std::array<double, 2>& p, const KeyInfo&)
     {
         if (p[0] != 0 || p[1] != 0) emit(path, fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
+    }
+    void numbers(const std::string& path, const std::vector<double>& xs, const KeyInfo&)
+    {
+        std::vector<std::string> texts;
+        for (const double x : xs) texts.push_back(digits(x));
+        emit(path, fmt::format("[{}]", fmt::join(texts, ", ")));
     }
     void points(const std::string& path, const std::vector<std::array<double, 2>>& ps, const KeyInfo&)
     {
@@ -114,6 +120,15 @@ public:
     {
         if (value) inlined(path, [&] { describe(path, *value); });
         else absent(path);
+    }
+    template <class T, class Describe> void part(const std::string& path, std::optional<T>& value, const KeyInfo& k, Describe describe)
+    {
+        if (!value) {
+            if (purpose_ == Purpose::File) out += fmt::format("\n# no [{}]: {}\n", path, k.doc);
+            return;
+        }
+        header("[" + path + "]");
+        describe(path, *value);
     }
     template <class T, class Describe>
     void automatic(const std::string& path, std::optional<T>& value, scene::Decision decision, const KeyInfo& k, Describe describe)

@@ -156,6 +156,16 @@ CASES = {
     "flat_velocity": ([FLAT, ("soil = \"sand\"", "soil = \"sand\"\nvelocity = [0.0, 1.0, 0.0]")], r'body\.0\.velocity: expected no velocity along y in 2-D'),
     "at_rest_without_gravity": ([("soil = \"sand\"", "soil = \"sand\"\nstress = \"at rest\""), ("gravity = [0.0, 0.0, -9.81]", "")], r'body\.0\.stress: expected gravity that points down for a stress "at rest", found none'),
     "several": ([("spacing = 0.1", "spacing = 0.0"), ("poisson = 0.3", "poisson = 0.7")], r':5: space\.spacing: [^\n]*\n[^\n]*:12: soil\.sand\.poisson: '),
+    # maps
+    "maps_flat": ([FLAT] + eff("[maps]"), r':21: maps: expected dimensions = 3 with \[maps\], which are drawn in plan, found 2; use dimensions = 3'),
+    "maps_cell_zero": (eff("[maps]\ncell = 0.0"), r':22: maps\.cell: expected a number in m, 0 < x <= 1e\+09, found 0'),
+    "maps_cell_minute": (eff("[maps]\ncell = 1e-5"), r':22: maps\.cell: expected at most 1e\+08 cells over all walls and soil, found 9e\+10 of 1e-05 m; let maps\.cell be 0\.0003'),
+    "maps_wet_negative": (eff("[maps]\nwet = -0.1"), r':22: maps\.wet: expected a number in m, 0 < x <= 1e\+09, found -0\.1'),
+    "maps_limit_negative": (eff("[maps]\nlimits = [0.5, -1.0]"), r':22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found -1 among them'),
+    "maps_limits_number": (eff("[maps]\nlimits = 0.5"), r':22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found 0\.5'),
+    "maps_limit_word": (eff("[maps]\nlimits = [\"deep\"]"), r':22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found "deep" among them'),
+    "maps_points_number": (eff("[maps]\npoints = 3"), r':22: maps\.points: expected a string, found 3'),
+    "maps_misspelt": (eff("[maps]\nlimit = [0.5]"), r':22: maps\.limit: expected a known key, found "limit"; did you mean "limits"'),
     # text that is no TOML, or no text
     "comma_decimal": (key("spacing = 0.1", "spacing = 0,1"), r':5: expected TOML, found an error in column 12: Error while parsing key-value pair:'),
     "unit_after_number": (key("end = 1.0", "end = 1.0 s"), r':8: expected TOML, found an error in column 11: Error while parsing key-value pair:'),
