@@ -355,6 +355,10 @@ void check_maps(const Scene& scene, const Filling& filling, Rules& rules)
                       text("cells of {:.4g} m are narrower than a particle ({:.4g} m): between particles they stay empty; take "
                            "two spacings or more",
                            maps->cell, scene.space.spacing));
+    for (std::size_t k = 0; k < maps->limits.size(); ++k)
+        if (std::find(maps->limits.begin(), maps->limits.begin() + std::ptrdiff_t(k), maps->limits[k]) !=
+            maps->limits.begin() + std::ptrdiff_t(k))
+            rules.error("maps.limits", text("expected each limit once, found {} again; leave it out", maps->limits[k]));
     const MapGrid grid = map_grid(scene, filling);
     if (const double cells = double(grid.columns) * double(grid.rows); cells > most_map_cells)
         rules.error("maps.cell",

@@ -26,7 +26,7 @@ struct MapGrid {
 };
 
 /// More cells make no map.
-inline constexpr double most_map_cells = 1e8;
+inline constexpr double most_map_cells = 5e7;
 
 /// The cells that cover everything in a scene that has maps, walls and soil; their corners are multiples of their side.
 MapGrid map_grid(const Scene&, const Filling&);
