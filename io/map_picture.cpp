@@ -171,7 +171,7 @@ void draw_north(Canvas& canvas, const View& v)
 
 void draw_legend(Canvas& canvas, const MapPicture& m, const View& v, const Scale& scale)
 {
-    const int x = left + v.width + 34, width = 24, height = std::min(v.height - 20 - 26 * int(m.outlines.size()), 320), y = top + 30;
+    const int x = left + v.width + 34, width = 24, height = std::clamp(v.height - 60 - 26 * int(m.outlines.size()), 100, 320), y = top + 30;
     canvas.text(x, top + 8, 16, fmt::format("[{}]", m.kind.unit), ink);
     canvas.rectangle(x - 1, y - 1, width + 2, height + 2, ink);
     for (int k = 0; k < height; ++k) canvas.rectangle(x, y + k, width, 1, map_color(1 - (k + 0.5) / height, has_signs(m.kind)));

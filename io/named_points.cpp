@@ -48,8 +48,11 @@ std::optional<double> number(const std::string& cell)
 
 } // namespace
 
-std::vector<NamedPoint> read_named_points(const Path& path)
+NamedPoints read_named_points(const Path& path)
 {
+    std::string ending = path.extension().string();
+    for (auto& c : ending) c = char(std::tolower((unsigned char)(c)));
+    if (ending != ".csv" && ending != ".txt") return read_points(path);
     std::string text;
     try {
         text = read_text(path, largest_file);
@@ -61,7 +64,8 @@ std::vector<NamedPoint> read_named_points(const Path& path)
     int line = 0;
     const auto refuse = [&](const std::string& what) { throw BadInput(fmt::format("{}:{}: {}", path.string(), line, what)); };
     if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
-    std::vector<NamedPoint> points;
+    NamedPoints all;
+    auto& points = all.points;
     std::set<std::string> names;
     std::vector<std::string> header;
     std::array<std::size_t, 3> at{};
@@ -93,7 +97,7 @@ std::vector<NamedPoint> read_named_points(const Path& path)
         if (cells.size() != header.size())
             refuse(fmt::format("expected {} cells as in the first line, found {}; a name with a \"{}\" in it is put in quotes",
                                header.size(), cells.size(), separator));
-        NamedPoint p{cells[at[0]], 0, 0, line};
+        NamedPoint p{cells[at[0]], 0, 0};
         if (p.name.empty()) refuse("expected a name, found none; every point needs one");
         if (const auto wrong = not_one_line(p.name); !wrong.empty()) refuse("expected a name in one line, found " + wrong);
         for (const int k : {1, 2}) {
@@ -110,7 +114,7 @@ std::vector<NamedPoint> read_named_points(const Path& path)
     }
     if (header.empty()) refuse("expected a first line with the columns name, x, y, found nothing");
     if (points.empty()) refuse("expected at least one point, found none; leave maps.points out, or add a line");
-    return points;
+    return all;
 }
 
 std::string csv_cell(const std::string& s)

@@ -6,9 +6,11 @@ import json
 import math
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
+import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, failures, finish, program
@@ -85,11 +87,29 @@ def rows(directory, name):
         return [r for r in csv.DictReader(f) if not next(iter(r.values())).startswith("#")]
 
 
+def polygons(path):
+    """The rings of a shapefile of polygons (ESRI's description, 1998), outer ones clockwise."""
+    with open(path, "rb") as f:
+        data = f.read()
+    rings, at = [], 100
+    while at < len(data):
+        length = struct.unpack_from(">i", data, at + 4)[0] * 2
+        kind, parts, points = struct.unpack_from("<i", data, at + 8)[0], *struct.unpack_from("<2i", data, at + 8 + 36)
+        check(kind == 5, "a polygon")
+        starts = [*struct.unpack_from(f"<{parts}i", data, at + 8 + 44), points]
+        xy = struct.unpack_from(f"<{2 * points}d", data, at + 8 + 44 + 4 * parts)
+        corners = list(zip(xy[::2], xy[1::2]))
+        rings += [corners[a:b] for a, b in zip(starts, starts[1:])]
+        at += 8 + length
+    return rings
+
+
 one = scene("one")
 call("run", one, "-o", "one", "--threads", "1", "--quiet")
 want = digest("one")
-check({n + ".tif" for n in NAMES} | {n + ".qml" for n in NAMES} | {"outline_0.15.geojson", "outline_0.4.geojson", "front.csv", "points.csv"}
-      == set(want), f"one file a map, its style, outlines, front and points, and nothing half written: {sorted(want)}")
+OUTLINES = {f"outline_{limit}.{ending}" for limit in ("0.15", "0.4") for ending in ("shp", "shx", "dbf")}
+check({n + ".tif" for n in NAMES} | {n + ".qml" for n in NAMES} | OUTLINES | {"front.csv", "points.csv", "h_max.png", "t_arrival.png"}
+      == {n for n in want if not n.endswith((".cpg", ".prj"))}, f"one file a map, its style, outlines, front and points, and nothing half written: {sorted(want)}")
 
 # ---- the same bytes whatever the ranks, threads and stops
 for ranks, threads in ((1, 2), (2, 1), (4, 1)):
@@ -129,12 +149,18 @@ front = rows("one", "front.csv")
 far = [float(r["distance"]) for r in front if r["distance"]]
 check(len(front) > 50 and far[-1] > far[0] + 0.3, f"the front goes on: {len(front)} rows, {far[0]} to {far[-1]} m")
 for limit, least in (("0.15", 0.5), ("0.4", 0.2)):
-    with open(os.path.join(work, "one", "maps", f"outline_{limit}.geojson")) as f:
-        polygons = json.load(f)["features"][0]["geometry"]["coordinates"]
-    rings = [r for p in polygons for r in p]
+    rings = polygons(os.path.join(work, "one", "maps", f"outline_{limit}.shp"))
     check(rings and all(r[0] == r[-1] and len(r) > 4 for r in rings), f"outline of {limit} m: closed rings")
-    area = sum(0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(r, r[1:])) for r in rings)
+    area = sum(0.5 * sum(b[0] * a[1] - a[0] * b[1] for a, b in zip(r, r[1:])) for r in rings)
     check(least < area < 4, f"outline of {limit} m: {area:.3f} m2")
+
+with open(os.path.join(work, "one", "report.html")) as f:
+    page = f.read()
+check('<section id="maps">' in page and page.split('<section id="maps">')[1].split("</section>")[0].count("data:image/png") == 2,
+      "the report shows thickness and arrival")
+with open(os.path.join(work, "one", "maps", "h_max.qml")) as f:
+    style = xml.etree.ElementTree.fromstring(f.read()).find(".//colorrampshader")
+check(len(style) == 11 and float(style[-1].get("value")) == float(style.get("maximumValue")), "a style of eleven colours up to the greatest value")
 
 # ---- as others read them
 if shutil.which("gdalinfo") and shutil.which("gdallocationinfo"):
@@ -175,7 +201,7 @@ with open(os.path.join(work, "elsewhere.csv"), "w") as f:
     f.write("name,x,y\na,100,200\nb,300,400\n")
 beyond = scene("beyond", maps='[maps]\npoints = "elsewhere.csv"')
 said = call("run", beyond, "-o", "beyond", expect=2).stderr
-check("elsewhere.csv:2: \"a\" at (100, 200) is not on the maps" in said and "none of the points is" in said, f"points of another place: {said}")
+check("elsewhere.csv: \"a\" at (100, 200) is not on the maps" in said and "none of the points is" in said, f"points of another place: {said}")
 check(not any(os.path.exists(os.path.join(work, d)) for d in ("flat", "nowhere", "beyond")), "nothing was written")
 plain = scene("plain", maps="", end=0.05)
 call("run", plain, "-o", "plain", "--quiet")
@@ -185,7 +211,8 @@ check("without them" in said and "go on without [maps]" in said, f"a checkpoint 
 said = call("run", scene("short", maps=MAPS + "cell = 0.3\n", end=0.5), "-o", "short", "--restart", expect=2).stderr
 check("cells of 0.2 m" in said and "maps.cell = 0.2" in said, f"a checkpoint with other cells: {said}")
 call("run", scene("short", maps=MAPS.replace("[0.15, 0.4]", "[0.3]"), end=0.45), "-o", "short", "--restart", "--quiet")
-check(os.path.exists(os.path.join(work, "short", "maps", "outline_0.3.geojson")), "other limits may be drawn on a restart")
+check(os.path.exists(os.path.join(work, "short", "maps", "outline_0.3.shp")), "other limits may be drawn on a restart")
+check(not any(n.startswith("outline_0.15") for n in os.listdir(os.path.join(work, "short", "maps"))), "and those before are gone")
 
 if not failures:
     shutil.rmtree(work)

@@ -1,5 +1,6 @@
 // Named points from a table: what is read, and what every kind of broken table is told.
 #include "io/named_points.hpp"
+#include <fmt/format.h>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +16,8 @@ class NamedPoints : public testing::Test {
 protected:
     void SetUp() override
     {
-        char name[] = "/tmp/kuzure_points_XXXXXX";
-        const int fd = mkstemp(name);
+        char name[] = "/tmp/kuzure_points_XXXXXX.csv";
+        const int fd = mkstemps(name, 4);
         ASSERT_GE(fd, 0);
         close(fd);
         path = name;
@@ -25,7 +26,7 @@ protected:
     std::vector<io::NamedPoint> read(const std::string& text)
     {
         std::ofstream(path, std::ios::binary) << text;
-        return io::read_named_points(path);
+        return io::read_named_points(path).points;
     }
     std::string complaint(const std::string& text)
     {
@@ -36,6 +37,12 @@ protected:
         }
         return "none";
     }
+    static std::string words_of(const std::vector<io::NamedPoint>& points)
+    {
+        std::string all;
+        for (const auto& p : points) all += fmt::format("{} ({:g}, {:g}) ", p.name, p.x, p.y);
+        return all;
+    }
     io::Path path;
 };
 
@@ -43,9 +50,9 @@ protected:
 
 TEST_F(NamedPoints, ColumnsInAnyOrderAmongOthers)
 {
-    const std::vector<io::NamedPoint> want{{"school, old", -1.5, 2e5, 3}, {"\u5b66\u6821", 3, 4, 5}};
-    EXPECT_EQ(read("\xEF\xBB\xBF# gauges\nY,height,Name,X\r\n2e5,9,\"school, old\",-1.5\r\n\r\n4,,\u5b66\u6821,+3\r\n"), want);
-    EXPECT_EQ(read("name;x;y\na;1.5;2"), (std::vector<io::NamedPoint>{{"a", 1.5, 2, 2}}));
+    EXPECT_EQ(words_of(read("\xEF\xBB\xBF# gauges\nY,height,Name,X\r\n2e5,9,\"school, old\",-1.5\r\n\r\n4,,\u5b66\u6821,+3\r\n")),
+              "school, old (-1.5, 200000) \u5b66\u6821 (3, 4) ");
+    EXPECT_EQ(words_of(read("name;x;y\na;1.5;2")), "a (1.5, 2) ");
 }
 
 TEST_F(NamedPoints, EveryFaultIsToldWithItsLine)
@@ -71,7 +78,7 @@ TEST_F(NamedPoints, EveryFaultIsToldWithItsLine)
 TEST_F(NamedPoints, AFileThatIsNotThereIsNamed)
 {
     EXPECT_THROW(io::read_named_points("/nowhere/houses.csv"), BadInput);
-    EXPECT_THROW(io::read_named_points("/"), BadInput);
+    EXPECT_THROW(io::read_named_points("/tmp"), BadInput);
 }
 
 TEST_F(NamedPoints, NamesComeBackFromTheirCells)

@@ -1,9 +1,8 @@
 #include "solver/app/run/maps.hpp"
 #include "io/ground/crs.hpp"
 #include "io/ground/raster.hpp"
-#include "io/map_style.hpp"
 #include "solver/core/ensure.hpp"
-#include "solver/scene/contour.hpp"
+#include "solver/scene/height_field.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -79,8 +78,8 @@ private:
     std::vector<std::string> names_;
 };
 
-/// The cells in a box around all of them, with a map's numbers.
-scene::Grid cut_out(const std::vector<MapCell>& cells, const scene::MapGrid& grid, double (*value)(const MapCell&))
+/// The cells in a box around all of them, in the coordinates of the scene.
+scene::Grid cut_out(const std::vector<MapCell>& cells, const scene::MapGrid& grid, double elsewhere, double (*value)(const MapCell&))
 {
     std::int64_t low[2] = {grid.columns, grid.rows}, high[2] = {-1, -1};
     for (const auto& c : cells) {
@@ -91,7 +90,7 @@ scene::Grid cut_out(const std::vector<MapCell>& cells, const scene::MapGrid& gri
     if (cells.empty()) return g;
     g.x = grid.x + (double(low[0]) + 0.5) * grid.cell, g.y = grid.y + (double(low[1]) + 0.5) * grid.cell, g.cell = grid.cell;
     g.columns = int(high[0] - low[0] + 1), g.rows = int(high[1] - low[1] + 1);
-    g.values.assign(std::size_t(g.columns) * std::size_t(g.rows), 0.0);
+    g.values.assign(std::size_t(g.columns) * std::size_t(g.rows), elsewhere);
     for (const auto& c : cells) g.at(int(c.cell % grid.columns - low[0]), int(c.cell / grid.columns - low[1])) = value(c);
     return g;
 }
@@ -105,18 +104,32 @@ std::vector<io::NamedPoint> points_of_maps(const Comm& comm, const Scene& scene,
     io::on_root(comm, [&] {
         io::need_terrain("maps");
         if (scene.maps->points.empty()) return;
-        points = io::read_named_points(scene.maps->points);
+        auto read = io::read_named_points(scene.maps->points);
+        points = std::move(read.points);
+        const std::string& here = scene.map_frame.crs;
+        if (!read.crs.empty() && here.empty())
+            throw BadInput(
+                fmt::format("{}: expected points in the scene's own coordinates, as it has no [terrain], found a coordinate system "
+                            "({}). Remedy: a .csv with name, x, y, or [terrain]",
+                            scene.maps->points, io::crs_name(read.crs)));
+        if (!read.crs.empty() && !io::same_crs(read.crs, here)) {
+            const io::Transform to_map(read.crs, here, scene.maps->points);
+            for (auto& p : points) {
+                const auto xy = to_map(p.x, p.y);
+                p.x = xy[0], p.y = xy[1];
+            }
+        }
         const auto grid = scene::map_grid(scene, filling);
         std::vector<const io::NamedPoint*> beyond;
         for (const auto& p : points)
             if (grid.at(p.x - scene.map_frame.x, p.y - scene.map_frame.y) < 0) beyond.push_back(&p);
         if (beyond.empty()) return;
         const double x = grid.x + scene.map_frame.x, y = grid.y + scene.map_frame.y;
-        const std::string what = fmt::format(
-            "{}:{}: \"{}\" at ({:.10g}, {:.10g}) is not on the maps, which reach from ({:.10g}, {:.10g}) to "
-            "({:.10g}, {:.10g}){}",
-            scene.maps->points, beyond[0]->line, beyond[0]->name, beyond[0]->x, beyond[0]->y, x, y, x + double(grid.columns) * grid.cell,
-            y + double(grid.rows) * grid.cell, beyond.size() > 1 ? fmt::format(", and {} more", beyond.size() - 1) : "");
+        const std::string what =
+            fmt::format("{}: \"{}\" at ({:.10g}, {:.10g}) is not on the maps, which reach from ({:.10g}, {:.10g}) to "
+                        "({:.10g}, {:.10g}){}",
+                        scene.maps->points, beyond[0]->name, beyond[0]->x, beyond[0]->y, x, y, x + double(grid.columns) * grid.cell,
+                        y + double(grid.rows) * grid.cell, beyond.size() > 1 ? fmt::format(", and {} more", beyond.size() - 1) : "");
         if (beyond.size() == points.size())
             throw BadInput(what +
                            ": none of the points is. Expected coordinates of the scene's map in m, x to the east; are they of another "
@@ -189,12 +202,12 @@ void Maps::take_back(double time)
     open_front(time);
 }
 
-void Maps::write(Simulation& sim)
+void Maps::write(Simulation& sim, Pictures pictures)
 {
     sim.timers().timed(Phase::Maps, [&] {
         double beyond = 0;
         const auto cells = record_.cells(sim.particles(), sim.time(), beyond);
-        io::on_root(comm_, [&] { write_files(cells, sim.time(), beyond); });
+        io::on_root(comm_, [&] { write_files(cells, sim.time(), beyond, pictures); });
     });
 }
 
@@ -222,11 +235,13 @@ void Maps::write_front(Simulation& sim)
     });
 }
 
-void Maps::write_files(const std::vector<MapCell>& cells, double time, double beyond)
+void Maps::write_files(const std::vector<MapCell>& cells, double time, double beyond, Pictures pictures)
 {
     const io::Place folder = io::hold(directory_ / "maps");
     write_rasters(folder, cells);
-    write_outlines(folder, cells);
+    const auto lines = outlines(cells);
+    write_outlines(folder, lines);
+    if (pictures == Pictures::Draw) write_pictures(folder, cells, lines);
     if (!points_.empty()) write_points(cells);
 
     double volume = 0, area = 0, thickest = 0, fastest = 0;
@@ -283,31 +298,57 @@ void Maps::write_rasters(const io::Place& folder, const std::vector<MapCell>& ce
     files.publish();
 }
 
-void Maps::write_outlines(const io::Place& folder, const std::vector<MapCell>& cells)
+/// The outlines of the limits, in the coordinates of the map.
+std::vector<io::MapPicture::Outline> Maps::outlines(const std::vector<MapCell>& cells) const
 {
-    if (scene_.maps->limits.empty()) return;
-    const auto thickness = cut_out(cells, record_.grid(), [](const MapCell& c) { return c.memory.thickness; });
-    Together files(folder);
-    for (const double limit : scene_.maps->limits) {
-        auto polygons = nlohmann::ordered_json::array();
-        for (const auto& area : scene::areas_above(thickness, limit)) {
-            auto rings = nlohmann::ordered_json::array();
-            for (const auto& ring : area) {
-                auto& corners = rings.emplace_back(nlohmann::ordered_json::array());
-                for (std::size_t k = 0; k <= ring.size(); ++k) {
-                    const auto& p = ring[k % ring.size()];
-                    corners.push_back({scene_.map_frame.x + p[0], scene_.map_frame.y + p[1]});
-                }
-            }
-            polygons.push_back(std::move(rings));
+    std::vector<io::MapPicture::Outline> all;
+    if (scene_.maps->limits.empty()) return all;
+    auto thickness = cut_out(cells, record_.grid(), 0, [](const MapCell& c) { return c.memory.thickness; });
+    thickness.x += scene_.map_frame.x, thickness.y += scene_.map_frame.y;
+    for (const double limit : scene_.maps->limits) all.push_back({limit, scene::areas_above(thickness, limit)});
+    return all;
+}
+
+void Maps::write_outlines(const io::Place& folder, const std::vector<io::MapPicture::Outline>& outlines)
+{
+    // A restart may draw other limits than those that are there.
+    for (const auto& name : io::names_in(folder))
+        if (name.starts_with("outline_") &&
+            std::ranges::none_of(outlines, [&](const auto& o) { return name.starts_with(fmt::format("outline_{}.", o.limit)); }))
+            io::remove_file(folder / name);
+    for (const auto& [limit, areas] : outlines) {
+        io::MapLayer layer{.kind = io::MapLayer::Polygons, .columns = {"limit_m", "area_m2"}, .features = {}, .crs = scene_.map_frame.crs};
+        for (const auto& area : areas) {
+            double twice = 0;
+            for (const auto& ring : area) twice += scene::doubled_area(ring);
+            layer.features.push_back({area, {limit, 0.5 * twice}});
         }
-        nlohmann::ordered_json all{{"type", "FeatureCollection"}, {"name", fmt::format("outline_{}", limit)}};
-        if (const int epsg = scene_.map_frame.crs.empty() ? 0 : io::epsg_of(scene_.map_frame.crs))
-            all["crs"] = {{"type", "name"}, {"properties", {{"name", fmt::format("urn:ogc:def:crs:EPSG::{}", epsg)}}}};
-        all["features"] = nlohmann::ordered_json::array({{{"type", "Feature"},
-                                                          {"properties", {{"map", "h_max"}, {"limit", limit}, {"unit", "m"}}},
-                                                          {"geometry", {{"type", "MultiPolygon"}, {"coordinates", std::move(polygons)}}}}});
-        files.add(fmt::format("outline_{}.geojson", limit), all.dump() + "\n");
+        const std::string name = fmt::format("outline_{}", limit);
+        io::write_shapefile(folder / (name + ".shp"), layer);
+    }
+}
+
+/// What the report shows: how thick it stood at most and when it came, on the ground, with the outlines.
+void Maps::write_pictures(const io::Place& folder, const std::vector<MapCell>& cells, const std::vector<io::MapPicture::Outline>& outlines)
+{
+    if (!io::can_draw()) return;
+    const scene::HeightField* ground = nullptr;
+    for (const auto& wall : scene_.walls)
+        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) ground = g->field.get();
+    Together files(folder);
+    for (const std::string_view name : {"h_max", "t_arrival"}) {
+        io::MapPicture picture{.kind =
+                                   *std::ranges::find(io::map_kinds, name, [](const io::MapKind& k) { return std::string_view(k.name); }),
+                               .title = scene_.title,
+                               .values = cut_out(
+                                   cells, record_.grid(), nan,
+                                   name == "h_max" ? [](const MapCell& c) { return reached(c) ? c.memory.thickness : nan; }
+                                                   : [](const MapCell& c) { return reached(c) ? c.memory.arrival : nan; }),
+                               .outlines = outlines};
+        picture.values.x += scene_.map_frame.x, picture.values.y += scene_.map_frame.y;
+        if (ground)
+            picture.ground = [&, ground](double x, double y) { return ground->at(x - scene_.map_frame.x, y - scene_.map_frame.y).z; };
+        files.add(fmt::format("{}.png", name), io::map_png(picture));
     }
     files.publish();
 }

@@ -1,6 +1,7 @@
 #pragma once
 // The maps of a run: rasters of what happened, outlines, what came to named points, how far the front got.
 #include "io/checkpoint.hpp"
+#include "io/map_picture.hpp"
 #include "io/named_points.hpp"
 #include "io/result_directory.hpp"
 #include "io/rows.hpp"
@@ -32,8 +33,9 @@ public:
     void after_step(Simulation&);
     /// Collective: the simulation went back to the last good state.
     void take_back(double time);
-    /// Collective: all files of maps as if the run ended here. Readers see the old ones or the new ones, each whole.
-    void write(Simulation&);
+    /// Collective: all files of maps as if the run ended here; pictures where they are drawn. Readers see old ones or new ones, each whole.
+    enum class Pictures { Draw, Leave };
+    void write(Simulation&, Pictures);
     /// Collective: a row of front.csv, where there is none of this time.
     void write_front(Simulation&);
     /// For summary.json, of the last write().
@@ -44,9 +46,11 @@ public:
 
 private:
     void open_front(std::optional<double> restart_time);
-    void write_files(const std::vector<MapCell>&, double time, double beyond);
+    void write_files(const std::vector<MapCell>&, double time, double beyond, Pictures);
     void write_rasters(const io::Place& folder, const std::vector<MapCell>&);
-    void write_outlines(const io::Place& folder, const std::vector<MapCell>&);
+    std::vector<io::MapPicture::Outline> outlines(const std::vector<MapCell>&) const;
+    void write_outlines(const io::Place& folder, const std::vector<io::MapPicture::Outline>&);
+    void write_pictures(const io::Place& folder, const std::vector<MapCell>&, const std::vector<io::MapPicture::Outline>&);
     void write_points(const std::vector<MapCell>&);
 
     const Comm& comm_;

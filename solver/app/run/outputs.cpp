@@ -54,7 +54,7 @@ void Outputs::begin_maps(Simulation& sim, std::vector<io::NamedPoint> points, co
 
 void Outputs::write_maps(Simulation& sim)
 {
-    if (maps_) maps_->write(sim);
+    if (maps_) maps_->write(sim, Maps::Pictures::Draw);
 }
 
 void Outputs::take_back(double time)
@@ -82,7 +82,7 @@ void Outputs::write_due(Simulation& sim, double before, bool last)
         if (due(scene_.output.history.value_or(scene_.time.end / 100), t, before) || last || before < 0) maps_->write_front(sim);
     }
     if (due(scene_.output.every, t, before) || last || before < 0) {
-        if (maps_) maps_->write(sim);
+        if (maps_) maps_->write(sim, last ? Maps::Pictures::Draw : Maps::Pictures::Leave);
         if (!snapshots_->last_time() || t > *snapshots_->last_time()) sim.timers().timed(Phase::Snapshot, [&] { write_snapshot(sim, {}); });
     }
 }
