@@ -32,7 +32,7 @@ GROUPS = {
     "migration": ["migrate"],
     "re-cut": ["partition"],
     "reductions": ["reduce"],
-    "I/O": ["snapshot", "history", "checkpoint", "picture"],
+    "I/O": ["snapshot", "history", "maps", "checkpoint", "picture"],
 }
 COMPUTES = ["interior pairs", "rim pairs", "move"]
 COLOURS = ["#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#888888"]

@@ -78,6 +78,35 @@ CASES = {
         key("spacing = 0.1", "spacing = 1e-6") + shape("box = { low = [1e8, 0.0, 0.0], high = [100000000.00001, 1e-5, 1e-5] }"),
         r"body\.0\.box: expected coordinates that tell particles 1e-06 m apart from each other, found such that rounding moves by .* m; move the scene nearer to the origin",
     ),
+    # maps
+    "maps_flat": (
+        [FLAT] + eff("[maps]"),
+        r":21: maps: expected dimensions = 3 with \[maps\], which are drawn in plan, found 2; use dimensions = 3",
+    ),
+    "maps_cell_zero": (eff("[maps]\ncell = 0.0"), r":22: maps\.cell: expected a number in m, 0 < x <= 1e\+09, found 0"),
+    "maps_cell_minute": (
+        eff("[maps]\ncell = 1e-5"),
+        r":22: maps\.cell: expected at most 5e\+07 cells over all walls and soil, found 9e\+10 of 1e-05 m; let maps\.cell be 0\.00045",
+    ),
+    "maps_wet_negative": (eff("[maps]\nwet = -0.1"), r":22: maps\.wet: expected a number in m, 0 < x <= 1e\+09, found -0\.1"),
+    "maps_limit_negative": (
+        eff("[maps]\nlimits = [0.5, -1.0]"),
+        r":22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found -1 among them",
+    ),
+    "maps_limits_number": (
+        eff("[maps]\nlimits = 0.5"),
+        r":22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found 0\.5",
+    ),
+    "maps_limit_word": (
+        eff('[maps]\nlimits = ["deep"]'),
+        r':22: maps\.limits: expected an array of numbers in m, 0 < x <= 1e\+09, found "deep" among them',
+    ),
+    "maps_limit_twice": (
+        eff("[maps]\nlimits = [0.5, 1.0, 0.5]"),
+        r":22: maps\.limits: expected each limit once, found 0\.5 again; leave it out",
+    ),
+    "maps_points_number": (eff("[maps]\npoints = 3"), r":22: maps\.points: expected a string, found 3"),
+    "maps_misspelt": (eff("[maps]\nlimit = [0.5]"), r':22: maps\.limit: expected a known key, found "limit"; did you mean "limits"'),
     # spelling and structure
     "unknown_top": (
         [("dimensions = 3", "dimensions = 3\ncolour = 1")],

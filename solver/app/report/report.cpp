@@ -160,6 +160,36 @@ std::string pictures(const Record& r)
     return s + "</div>\n";
 }
 
+/// What came where: nothing where the scene has no maps.
+std::string maps(const Record& r)
+{
+    if (!r.summary.contains("maps") || !r.summary["maps"].is_object()) return {};
+    const auto& m = r.summary["maps"];
+    std::string s = "<dl class=\"cards\">";
+    s += card("reached", grouped(at(m, {"area_reached"})) + " m\u00b2", fmt::format("at least {} m thick", shown(at(m, {"wet"}))));
+    s += card("greatest thickness", shown(at(m, {"h_max"})) + " m", fmt::format("of a cell of {} m", shown(at(m, {"cell"}))));
+    s += card("greatest speed", shown(at(m, {"v_max"})) + " m/s", "mean over the depth");
+    s += card("soil on the maps", shown(at(m, {"volume"})) + " m\u00b3",
+              more(at(m, {"volume_beyond"}), 0) ? shown(at(m, {"volume_beyond"})) + " m\u00b3 beyond them" : "none beyond them");
+    s += "</dl>\n<div class=\"pictures\">\n";
+    for (const auto& [name, caption] : {std::pair{"h_max", "greatest thickness"}, std::pair{"t_arrival", "arrival"}}) {
+        try {
+            const auto folder = io::hold(io::hold(r.directory) / "maps");
+            const auto file = folder / (std::string(name) + ".png");
+            if (!io::exists(file)) continue;
+            s += fmt::format("<figure><img alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n", caption,
+                             data_uri("image/png", io::read_text(file, largest_picture)));
+        } catch (const IoFailed& e) {
+            s += "<p>" + escaped(e.what()) + "</p>";
+        }
+    }
+    const std::string crs = word(m, "crs");
+    return s +
+           fmt::format("</div>\n<p class=\"soft small\">{}. The rasters are in <code>maps/</code>, with styles for QGIS; docs/maps.md says "
+                       "what each holds.</p>\n",
+                       crs.empty() ? "Coordinates of the scene" : "Coordinates in " + escaped(crs));
+}
+
 std::string energy(const Record& r)
 {
     const auto t = column(r.history, "time");
@@ -312,6 +342,7 @@ std::string html(const Record& r)
 {
     std::string s = opening(r);
     s += section("pictures", "Pictures", pictures(r));
+    s += section("maps", "Maps", maps(r));
     s += section("energy", "Energy", energy(r));
     s += section("heap", "The heap", heap(r));
     s += section("error-bars", "The answer and its error bars", error_bars(r));
