@@ -1,6 +1,7 @@
 #include "solver/run/watch.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/height_field.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
 #include <limits>
@@ -215,6 +216,23 @@ void Watch::inspect(const Particles& p, const Layout& layout, Clock& clock, cons
     if (seen.deepest > limit::penetration)
         fail_at(p, clock, seen.sunk_id, fmt::format("has sunk {:.1f} spacings into a wall", seen.deepest),
                 "a thicker wall (2 h), a smaller step, or viscosity with beta = 1 for fast impacts");
+    if (scene_.terrain && scene_.terrain->edge == scene::Edge::Closed) judge_edge(p, clock);
+}
+
+void Watch::judge_edge(const Particles& p, const Clock& clock)
+{
+    Worst outside;
+    for (const auto& wall : scene_.walls) {
+        const auto* ground = std::get_if<scene::Ground>(&wall.shape);
+        if (!ground) continue;
+        for (Index i = 0; i < p.size(); ++i) {
+            const Vector x = p[field::position][i];
+            if (!std::isfinite(ground->field->at(x.x, x.y).z)) outside.meet(1, p[field::id][i]);
+        }
+    }
+    if (const std::int64_t id = outside.combine(comm_); id >= 0)
+        fail_at(p, clock, id, "has left the ground (terrain.edge = \"closed\")",
+                "a larger elevation model or terrain.window, or terrain.edge = \"open\", which counts what leaves");
 }
 
 } // namespace kuzure

@@ -54,6 +54,8 @@ private:
     [[noreturn]] void fail_at(const Particles&, const Clock&, std::int64_t id, const std::string& what, const std::string& remedy);
     /// Fixed walls give no energy, and dissipations do not fall. Throws NumbersFailed.
     void judge_ledger(const Particles&, Clock&, const Ledger&);
+    /// No soil is where there is no ground. Collective. Throws NumbersFailed.
+    void judge_edge(const Particles&, const Clock&);
     /// "wall 2", the one nearest to a particle.
     std::string nearest_wall(const Particles&, std::int64_t id) const;
     /// Id of the fastest particle, the lowest of several.

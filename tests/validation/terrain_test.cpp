@@ -1,5 +1,6 @@
 // Soil on real ground: blocks on inclines however they lie in the grid, a round foot, rest on waves, volume.
 #include "solver/walls/surface.hpp"
+#include <gmock/gmock.h>
 #include "tests/validation/terrain.hpp"
 
 using namespace kuzure;
@@ -233,6 +234,27 @@ TEST(Terrain, SandRestsOnWavesAndAtAStep)
     at_rest([](double x, double y) { return 0.25 * std::sin(2 * pi * x / 10) * std::cos(2 * pi * y / 12); }, "waves");
     // A step of 0.9 m at 60 degrees beneath the middle.
     at_rest([](double x, double) { return std::clamp(x * std::tan(radians(60)), -0.45, 0.45); }, "step of 60 deg");
+}
+
+TEST(Terrain, ClosedEdgeEndsTheRunWhereSoilLeaves)
+{
+    auto g = block(30, 10);
+    g.text.end = 4;
+    g.ground = heights([](double x, double) { return -std::tan(radians(30)) * x; }, {-6, -6}, {6, 6}, 1.0);
+    Scene s = g.scene();
+    s.terrain = scene::Terrain{};
+    s.terrain->edge = scene::Edge::Closed;
+    try {
+        Simulation sim(Comm::world(), s);
+        run_to(sim, 4);
+        ADD_FAILURE() << "soil left a closed ground";
+    } catch (const NumbersFailed& e) {
+        EXPECT_THAT(e.what(), testing::HasSubstr("has left the ground (terrain.edge = \"closed\")"));
+    }
+    s.terrain->edge = scene::Edge::Open;
+    Simulation sim(Comm::world(), s);
+    run_to(sim, 4);
+    EXPECT_GT(centre(sim).x, 6);
 }
 
 TEST(Terrain, FixedGroundGivesNothing)
