@@ -130,7 +130,13 @@ template <class A> void describe_terrain(A& a, std::optional<scene::Terrain>& te
                a.choice(p + ".edge", t.edge, {{"open", scene::Edge::Open}, {"closed", scene::Edge::Closed}},
                         {.fallback = "\"open\"",
                          .example = "\"closed\"",
-                         .doc = "\"open\": soil that leaves the ground is counted and gone; \"closed\": it ends the run (exit 3)"});
+                         .doc = "\"open\": soil that leaves the ground falls and is counted; \"closed\": it ends the run (exit 3)"});
+               a.choice(p + ".lattice", t.lattice, {{"draped", scene::GroundLattice::Draped}, {"plain", scene::GroundLattice::Plain}},
+                        {.fallback = "\"draped\"",
+                         .example = "\"plain\"",
+                         .doc =
+                             "wall particles of the ground: \"draped\" along its surface, with no stairs; \"plain\": on the cubic lattice, "
+                             "for ground steeper than 55 degrees, where draped columns stand too far apart"});
            });
 }
 

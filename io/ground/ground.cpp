@@ -524,7 +524,7 @@ private:
         }
         std::erase_if(scene_.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
         scene_.walls.push_back(
-            {scene::Ground{field, scene::ground_depth(*field, scene_.support())}, terrain_.surface, terrain_.friction_angle});
+            {scene::Ground{field, scene::ground_depth(*field, scene_.support()), terrain_.lattice}, terrain_.surface, terrain_.friction_angle});
     }
 
     Scene& scene_;

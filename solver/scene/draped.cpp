@@ -55,13 +55,14 @@ template <class Count> void Draped::fill(const Box& outer, Count count)
         }
 }
 
-Draped::Draped(const Ground& ground, double spacing) : field_(ground.field), spacing_(spacing), below_(true)
+Draped::Draped(const Ground& ground, double spacing)
+    : field_(ground.field), spacing_(spacing), below_(true), plain_(ground.lattice == GroundLattice::Plain)
 {
     const auto layers = std::int64_t(std::ceil(ground.depth / spacing - 1e-9));
     fill(scene::bounds(ground), [&](auto, auto, double, double) { return layers; });
 }
 
-Draped::Draped(const Release& release, double spacing) : field_(release.bed), spacing_(spacing), below_(false)
+Draped::Draped(const Release& release, double spacing) : field_(release.bed), spacing_(spacing), below_(false), plain_(false)
 {
     fill(scene::bounds(release), [&](std::int64_t i, std::int64_t j, double x, double y) {
         return std::int64_t(std::floor(thickness(release, x, y) / spacing + 1e-9 + bayer(i, j)));

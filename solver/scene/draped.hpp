@@ -15,7 +15,7 @@ namespace kuzure::scene {
 /// ground. Local ids: y slowest, then x, then z from below.
 class Draped {
 public:
-    /// The wall particles of the ground, as deep as it says.
+    /// The wall particles of the ground, as deep as it says; on its plain lattice at heights (k + 1/2) spacings below the surface.
     Draped(const Ground&, double spacing);
     /// The soil of a release: whole particles in every column, rounded by an ordered pattern (Bayer's, 8 x 8) so that their volume is
     /// that of the thicknesses.
@@ -63,7 +63,11 @@ public:
 private:
     template <class Count> void fill(const Box& outer, Count count);
     /// z of the k-th of n points above or below the surface.
-    double height(double surface, std::int64_t k, std::int64_t n) const { return surface + (double(below_ ? k - n : k) + 0.5) * spacing_; }
+    double height(double surface, std::int64_t k, std::int64_t n) const
+    {
+        if (plain_) return (std::floor(surface / spacing_ - 0.5) + double(k - n) + 1.5) * spacing_;
+        return surface + (double(below_ ? k - n : k) + 0.5) * spacing_;
+    }
     double at(std::int64_t i) const { return (double(i) + 0.5) * spacing_; }
     /// Calls visit(first id, x, y, height of the surface, points) for the columns over a region in plan.
     template <class Visit> void for_each_column_in(const Box& region, Visit visit) const
@@ -90,7 +94,7 @@ private:
 
     std::shared_ptr<const HeightField> field_;
     double spacing_;
-    bool below_;
+    bool below_, plain_;
     std::int64_t i0_ = 0, j0_ = 0, columns_ = 0, rows_ = 0;
     std::vector<std::int64_t> first_{0}; // id of each column's lowest point, and the end
     std::int64_t most_ = 0;              // points of a column

@@ -37,11 +37,14 @@ struct Polygon {
     std::array<double, 2> y{};                 // m
     bool operator==(const Polygon&) const = default;
 };
+/// How wall particles fill the ground: columns that follow its surface, or the cubic lattice of all other walls, cut by it.
+enum class GroundLattice { Draped, Plain };
 /// Everything below a height field, down to where no soil can feel it.
 struct Ground {
     std::shared_ptr<const HeightField> field; // as wide as the wall
     double depth = 0;                         // m, of the wall particles' layer, along z
-    bool operator==(const Ground&) const;     // by its heights
+    GroundLattice lattice = GroundLattice::Draped;
+    bool operator==(const Ground&) const; // by its heights
 };
 /// A closed ring of corners in plan, m; the last corner is not the first again.
 using Ring = std::vector<std::array<double, 2>>;

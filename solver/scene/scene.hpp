@@ -70,6 +70,7 @@ struct Terrain {
     Surface surface = Surface::Coulomb;
     double friction_angle = 0; // rad, for Coulomb
     Edge edge = Edge::Open;
+    GroundLattice lattice = GroundLattice::Draped;
     bool operator==(const Terrain&) const = default;
 };
 /// Where the scene's coordinates lie on the map.

@@ -7,7 +7,7 @@ namespace kuzure::scene {
 
 bool Ground::operator==(const Ground& o) const
 {
-    return depth == o.depth && (field == o.field || (field && o.field && field->grid() == o.field->grid()));
+    return depth == o.depth && lattice == o.lattice && (field == o.field || (field && o.field && field->grid() == o.field->grid()));
 }
 bool Release::operator==(const Release& o) const
 {

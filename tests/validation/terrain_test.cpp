@@ -1,7 +1,7 @@
 // Soil on real ground: blocks on inclines however they lie in the grid, a round foot, rest on waves, volume.
 #include "solver/walls/surface.hpp"
-#include <gmock/gmock.h>
 #include "tests/validation/terrain.hpp"
+#include <gmock/gmock.h>
 
 using namespace kuzure;
 using namespace kuzure::validation;
