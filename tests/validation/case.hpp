@@ -208,7 +208,12 @@ public:
         e2_ += e * e, r2_ += reference * reference;
         e_ = std::max(e_, std::fabs(e)), r_ = std::max(r_, std::fabs(reference));
     }
-    double L2() const { return std::sqrt(world().sum(e2_) / world().sum(r2_)); }
+    double L2() const
+    {
+        double sums[2] = {e2_, r2_};
+        world().sum(std::span<double>(sums)); // of doubles there is no sum of one: it would be taken for a whole number
+        return std::sqrt(sums[0] / sums[1]);
+    }
     double Linf() const { return world().max(e_) / world().max(r_); }
 
 private:
