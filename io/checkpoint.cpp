@@ -62,6 +62,7 @@ std::span<const std::uint8_t> bytes_on_root(const Team& team, const std::string&
     return {reinterpret_cast<const std::uint8_t*>(text.data()), team.rank() == 0 ? text.size() : 0};
 }
 
+std::string extra_name(std::string_view table) { return fmt::format("/tables/{}", table); }
 std::string table_name(std::string_view field) { return fmt::format("/particles/{}", field); }
 
 // ---- reading --------------------------------------------------------------------------------------------------------
@@ -70,10 +71,17 @@ struct FieldEntry {
     int components;
     std::string checksum;
 };
+struct TableEntry {
+    std::string name;
+    std::uint64_t rows;
+    int components;
+    std::string checksum;
+};
 struct Manifest {
     std::string text;
     Checkpoint what;
     std::vector<FieldEntry> fields;
+    std::vector<TableEntry> tables;
 };
 
 std::string read_bytes(const H5Reader& in, const std::string& name)
@@ -103,6 +111,10 @@ Manifest read_manifest(const H5Reader& in)
         m.what.scene_hash = all.at("scene_hash").get<std::string>();
         for (const auto& f : all.at("fields"))
             m.fields.push_back({f.at("name").get<std::string>(), f.at("components").get<int>(), f.at("checksum").get<std::string>()});
+        if (all.contains("tables"))
+            for (const auto& t : all.at("tables"))
+                m.tables.push_back({t.at("name").get<std::string>(), t.at("rows").get<std::uint64_t>(), t.at("components").get<int>(),
+                                    t.at("checksum").get<std::string>()});
         m.what.header = read_bytes(in, "/header");
         if (all.at("header_checksum") != hex(sum_of_text(m.what.header))) in.refuse("damaged: the checksum of /header does not fit");
     } catch (const json::exception& e) {
@@ -112,22 +124,60 @@ Manifest read_manifest(const H5Reader& in)
     return m;
 }
 
+/// Collective. Each rank reads for itself: where one finds damage, none may be waiting inside the library.
+template <class Work> void guarded_on(const Team& team, const Place& file, const Work& work)
+{
+    std::string complaint;
+    try {
+        work();
+    } catch (const IoFailed& e) {
+        complaint = e.what();
+    } catch (const std::bad_alloc&) {
+        complaint = fmt::format("{}: not enough memory to read it: use more ranks on more nodes", file.string());
+    }
+    agree(team, complaint);
+}
+
+/// A rank's contiguous share of rows.
+struct Share {
+    std::uint64_t first, count;
+    Share(const Team& team, std::uint64_t total)
+    {
+        const auto ranks = std::uint64_t(team.size()), me = std::uint64_t(team.rank());
+        first = total / ranks * me + std::min(me, total % ranks);
+        count = total / ranks + (me < total % ranks ? 1 : 0);
+    }
+};
+
+/// Collective: reads this rank's share of a table and checks all of it; keeps the rows in `into` if there is one.
+void read_table(const Team& team, const H5Reader& in, const TableEntry& t, std::vector<double>* into)
+{
+    const std::string name = extra_name(t.name);
+    std::uint64_t sum = 0;
+    guarded_on(team, in.file(), [&] {
+        const auto found = in.table(name);
+        if (found.rows != t.rows || found.components != t.components || t.components < 1)
+            in.refuse(
+                fmt::format("damaged: table {} is {} x {}, expected {} x {}", name, found.rows, found.components, t.rows, t.components));
+        const Share mine(team, t.rows);
+        std::vector<double> rows;
+        for (std::uint64_t at = 0; at < mine.count; at += rows_at_a_time) {
+            const auto n = std::min(rows_at_a_time, mine.count - at);
+            in.rows(name, mine.first + at, n, t.components, rows);
+            sum += sum_of_rows(std::span<const double>(rows), t.components, mine.first + at);
+            if (into) into->insert(into->end(), rows.begin(), rows.end());
+        }
+    });
+    sum = sum_over_ranks(team, sum);
+    guarded_on(team, in.file(), [&] {
+        if (hex(sum) != t.checksum) in.refuse(fmt::format("damaged: the checksum of {} does not fit", name));
+    });
+}
+
 /// Reads and checks the rows of this rank, field by field; keeps them in `into` if there is one.
 Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H5Reader> in, Particles* into)
 {
-    // Each rank reads for itself: where one finds damage, none may be waiting inside the library.
-    const auto guarded = [&](const auto& work) {
-        std::string complaint;
-        try {
-            work();
-        } catch (const IoFailed& e) {
-            complaint = e.what();
-        } catch (const std::bad_alloc&) {
-            complaint = fmt::format("{}: not enough memory to read it: use more ranks on more nodes", file.string());
-        }
-        agree(team, complaint);
-    };
-
+    const auto guarded = [&](const auto& work) { guarded_on(team, file, work); };
     Manifest m;
     std::uint64_t first = 0, count = 0;
     guarded([&] {
@@ -140,11 +190,11 @@ Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H
         if (m.text != first_says) in->refuse("it was replaced by another while it was being opened: start again");
     });
     guarded([&] {
-        const auto total = std::uint64_t(m.what.particles), ranks = std::uint64_t(team.size()), me = std::uint64_t(team.rank());
-        first = total / ranks * me + std::min(me, total % ranks);
-        count = total / ranks + (me < total % ranks ? 1 : 0);
+        const auto total = std::uint64_t(m.what.particles);
+        const Share mine(team, total);
+        first = mine.first, count = mine.count;
         if (count > std::uint64_t(std::numeric_limits<Index>::max()) - 2 * Particles::padding)
-            in->refuse(fmt::format("{} particles are too many for {} ranks", total, ranks));
+            in->refuse(fmt::format("{} particles are too many for {} ranks", total, team.size()));
         // Before memory is taken: every table has the rows and columns that the manifest names.
         for (const auto& f : m.fields)
             if (const auto t = in->table(table_name(f.name)); t.rows != total || t.components != f.components)
@@ -200,6 +250,8 @@ Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H
     };
     try {
         std::apply([&](auto... f) { (read_field(f), ...); }, AllFields{});
+        if (!into)
+            for (const auto& t : m.tables) read_table(team, *in, t, nullptr);
     } catch (...) {
         if (into) into->resize(0);
         throw;
@@ -216,14 +268,17 @@ std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_par
 }
 
 Place write_checkpoint(const Team& team, const Place& directory, const Particles& p, const std::string& scene_hash,
-                       const std::string& header)
+                       const std::string& header, std::span<const CheckpointTable> tables)
 {
     Place file = directory / newest_name;
     const Place previous = directory / previous_name;
     try {
         const std::int64_t total = team.sum(std::int64_t(p.size()));
         const auto first = std::uint64_t(team.sum_below(std::int64_t(p.size())));
-        H5Writer out(team, file, checkpoint_bytes(total, p.bytes_per_particle()));
+        std::int64_t further = 0; // bytes
+        for (const auto& t : tables) further += std::int64_t(t.rows.size() * sizeof(double));
+        further = team.sum(further);
+        H5Writer out(team, file, checkpoint_bytes(total, p.bytes_per_particle()) + std::uint64_t(further));
         out.group("/particles");
         json manifest = {{"format", format_name},    {"version", format_version}, {"particles", total},
                          {"scene_hash", scene_hash}, {"fields", json::array()},   {"header_checksum", hex(sum_of_text(header))}};
@@ -240,6 +295,16 @@ Place write_checkpoint(const Team& team, const Place& directory, const Particles
             const auto sum = sum_over_ranks(team, sum_of_rows(mine, f.components, first));
             manifest["fields"].push_back({{"name", f.name}, {"components", f.components}, {"checksum", hex(sum)}});
         });
+        if (!tables.empty()) out.group("/tables");
+        for (const auto& t : tables) {
+            const auto n = std::int64_t(t.rows.size()) / t.components;
+            const auto before = std::uint64_t(team.sum_below(n));
+            const std::span<const double> mine(t.rows);
+            out.table(extra_name(t.name), mine, t.components);
+            out.attribute(extra_name(t.name), "unit", t.unit);
+            const auto sum = sum_over_ranks(team, sum_of_rows(mine, t.components, before));
+            manifest["tables"].push_back({{"name", t.name}, {"rows", team.sum(n)}, {"components", t.components}, {"checksum", hex(sum)}});
+        }
         out.table("/header", bytes_on_root(team, header), 1);
         const std::string text = manifest.dump(1);
         out.table("/manifest", bytes_on_root(team, text), 1);
@@ -279,6 +344,21 @@ Checkpoint read_checkpoint(const Team& team, const Place& file, Particles& into)
 void read_checkpoint(const Team& team, const Checkpoint& verified, Particles& into)
 {
     read_all(team, verified.file, verified.opened, &into);
+}
+
+std::optional<std::vector<double>> read_checkpoint_table(const Team& team, const Checkpoint& from, const std::string& name, int components)
+{
+    Manifest m;
+    guarded_on(team, from.file, [&] { m = read_manifest(*from.opened); });
+    const auto t = std::ranges::find(m.tables, name, &TableEntry::name);
+    if (t == m.tables.end()) return {};
+    std::vector<double> rows;
+    guarded_on(team, from.file, [&] {
+        if (t->components != components)
+            from.opened->refuse(fmt::format("table {} has {} components, expected {}", extra_name(name), t->components, components));
+    });
+    read_table(team, *from.opened, *t, &rows);
+    return rows;
 }
 
 Checkpoint verify_checkpoint(const Team& team, const Place& file) { return read_all(team, file, {}, nullptr); }

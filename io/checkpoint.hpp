@@ -19,18 +19,26 @@ struct Checkpoint {
     std::shared_ptr<const H5Reader> opened;
 };
 
+/// Rows beside the particles', on any ranks in any order.
+struct CheckpointTable {
+    std::string name, unit;
+    int components = 1;
+    std::vector<double> rows; // this rank's, one after the other
+};
+
 /// A checkpoint that could not be written; its words name the one that is still good.
 struct CheckpointFailed : IoFailed {
     using IoFailed::IoFailed;
 };
 
-/// Size of a checkpoint of that many particles.
+/// Size of a checkpoint of that many particles, without tables.
 std::uint64_t checkpoint_bytes(std::int64_t particles, std::size_t bytes_per_particle);
 
-/// Collective. Writes every present field to directory/checkpoint.h5; the checkpoint before it becomes
-/// checkpoint.prev.h5. Until the new one is whole and on the disk, the old ones stay as they are. Throws
-/// CheckpointFailed. Gives the file's path.
-Place write_checkpoint(const Team&, const Place& directory, const Particles&, const std::string& scene_hash, const std::string& header);
+/// Collective. Writes every present field and these tables (all ranks name the same) to directory/checkpoint.h5; the checkpoint before it
+/// becomes checkpoint.prev.h5. Until the new one is whole and on the disk, the old ones stay as they are. Throws CheckpointFailed. Gives
+/// the file's path.
+Place write_checkpoint(const Team&, const Place& directory, const Particles&, const std::string& scene_hash, const std::string& header,
+                       std::span<const CheckpointTable> tables = {});
 
 /// Collective. Replaces the particles: each rank gets a contiguous share of the rows as written, with the
 /// fields of the file. Refuses by IoFailed, on all ranks, what is damaged, cut short, of another format, or
@@ -38,6 +46,9 @@ Place write_checkpoint(const Team&, const Place& directory, const Particles&, co
 Checkpoint read_checkpoint(const Team&, const Place& file, Particles&);
 /// The same of the very file that was verified.
 void read_checkpoint(const Team&, const Checkpoint&, Particles&);
+
+/// Collective. A contiguous share of a table of a checkpoint that was verified, or nothing where it has none of this name. Throws IoFailed.
+std::optional<std::vector<double>> read_checkpoint_table(const Team&, const Checkpoint&, const std::string& name, int components);
 
 /// Collective. Reads the whole checkpoint without keeping its particles. Throws IoFailed as read_checkpoint does.
 Checkpoint verify_checkpoint(const Team&, const Place& file);

@@ -341,6 +341,35 @@ template <class A> void describe_output(A& a, scene::Output& output)
            {.fallback = "false", .example = "true", .doc = "the pictures as a film at the end (needs ffmpeg)"});
 }
 
+template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
+{
+    a.part("maps", maps,
+           {.example = "{ limits = [0.5, 1.0] }",
+            .doc = "rasters of what happened, in maps/ of the result directory (docs/maps.md)",
+            .role = Role::Bookkeeping},
+           [&](const std::string& p, auto& v) {
+               a.number(p + ".cell", v.cell,
+                        {.unit = "m", .range = size, .optional = true, .example = "2.0", .doc = "side of a cell; without it two spacings"});
+               a.number(p + ".wet", v.wet,
+                        {.unit = "m",
+                         .range = size,
+                         .optional = true,
+                         .example = "0.1",
+                         .doc = "least thickness that counts as reached; without it one spacing"});
+               a.numbers(p + ".limits", v.limits,
+                         {.unit = "m",
+                          .range = size,
+                          .fallback = "[]",
+                          .example = "[0.5, 1.0, 2.0]",
+                          .doc = "greatest thicknesses whose outlines are drawn"});
+               a.text(p + ".points", v.points,
+                      {.optional = true,
+                       .example = "\"houses.csv\"",
+                       .doc = "named points (.csv with the columns name, x, y) of which points.csv tells arrival, greatest thickness, "
+                              "speed and pressure"});
+           });
+}
+
 /// Every key of a scene, in the order in which scenes are written.
 template <class A> void describe(A& a, Scene& s)
 {
@@ -416,6 +445,7 @@ template <class A> void describe(A& a, Scene& s)
             .role = Role::Bookkeeping});
     describe_effects(a, s.effects);
     describe_accuracy(a, s.accuracy);
+    describe_maps(a, s.maps);
     describe_output(a, s.output);
 }
 

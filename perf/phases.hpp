@@ -30,6 +30,7 @@ enum class Phase {
     // Output
     Snapshot,
     History,
+    Maps,
     Checkpoint,
     Picture,
     // What encloses them all: its own row is the time in no other phase
@@ -40,8 +41,8 @@ inline constexpr int n_phases = int(Phase::Count);
 
 /// Names as they stand in timers.json and timers.txt.
 inline constexpr std::array<std::string_view, n_phases> phase_names{
-    "setup",         "partition", "migrate", "sort",  "ghosts",   "lists",   "move",       "begin halo", "interior pairs",
-    "wait for halo", "rim pairs", "reduce",  "guard", "snapshot", "history", "checkpoint", "picture",    "other"};
+    "setup",     "partition", "migrate", "sort",     "ghosts",  "lists", "move",       "begin halo", "interior pairs", "wait for halo",
+    "rim pairs", "reduce",    "guard",   "snapshot", "history", "maps",  "checkpoint", "picture",    "other"};
 static_assert(std::ranges::none_of(phase_names, &std::string_view::empty), "every phase needs a name");
 
 constexpr std::string_view name(Phase phase) { return phase_names[int(phase)]; }

@@ -65,6 +65,8 @@ public:
     /// Collective. Back to the last state that the guard found good, to go on with half the step; only with time.retry.
     /// False, and nothing changed, if there is none or this failure was met before.
     bool roll_back();
+    /// The step (its number) to which roll_back() would go; -1 where it cannot.
+    std::int64_t good_step() const { return last_good_ ? last_good_->clock.step : -1; }
     /// Id of the particle that the last NumbersFailed named; -1 before there was one.
     std::int64_t failed_id() const { return watch_.failed_id(); }
 

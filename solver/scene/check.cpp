@@ -1,6 +1,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/core/field.hpp"
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/map_grid.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/nearby.hpp"
 #include "solver/scene/numbers.hpp"
@@ -345,6 +346,27 @@ void check_plausible(const Scene& scene, Rules& rules)
     interval("output.history", scene.output.history, "row");
 }
 
+void check_maps(const Scene& scene, const Filling& filling, Rules& rules)
+{
+    const auto& maps = scene.maps;
+    if (!maps) return;
+    if (maps->cell < scene.space.spacing * (1 - 1e-9))
+        rules.warning("maps.cell",
+                      text("cells of {:.4g} m are narrower than a particle ({:.4g} m): between particles they stay empty; take "
+                           "two spacings or more",
+                           maps->cell, scene.space.spacing));
+    for (std::size_t k = 0; k < maps->limits.size(); ++k)
+        if (std::find(maps->limits.begin(), maps->limits.begin() + std::ptrdiff_t(k), maps->limits[k]) !=
+            maps->limits.begin() + std::ptrdiff_t(k))
+            rules.error("maps.limits", text("expected each limit once, found {} again; leave it out", maps->limits[k]));
+    const MapGrid grid = map_grid(scene, filling);
+    if (const double cells = double(grid.columns) * double(grid.rows); cells > most_map_cells)
+        rules.error("maps.cell",
+                    text("expected at most {:.3g} cells over all walls and soil, found {:.3g} of {:.4g} m; let maps.cell be {:.2g} "
+                         "or more",
+                         most_map_cells, cells, maps->cell, 1.05 * maps->cell * std::sqrt(cells / most_map_cells)));
+}
+
 void check_time(const Scene& scene, StepLimit limit, Rules& rules)
 {
     const auto severity = limit == StepLimit::Enforce ? Severity::Error : Severity::Warning;
@@ -486,6 +508,10 @@ double stable_step(const Scene& scene) { return unstable_courant(scene) * crossi
 
 void resolve(Scene& scene)
 {
+    if (auto& maps = scene.maps) {
+        if (maps->cell == 0) maps->cell = 2 * scene.space.spacing;
+        if (maps->wet == 0) maps->wet = scene.space.spacing;
+    }
     auto& notes = scene.notes;
     notes.clear();
     const auto note = [&](const char* name, bool on, std::string why) { notes.push_back({name, std::move(why), on}); };
@@ -656,6 +682,9 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
     check_time(scene, limit, rules);
     check_plausible(scene, rules);
     check_inside(scene, rules);
+    if (scene.maps && scene.dimensions == 2)
+        rules.error("maps",
+                    "expected dimensions = 3 with [maps], which are drawn in plan, found 2; use dimensions = 3 or leave [maps] out");
     // Filling asks for shapes that make sense.
     std::optional<Filling> filling;
     if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; })) {
@@ -665,6 +694,7 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
     }
     if (filling) {
         check_edges(scene, rules);
+        check_maps(scene, *filling, rules);
         for (auto& n : dimensionless_numbers(scene, *filling))
             if (!n.warning.empty()) rules.warning(n.name, n.warning);
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)
@@ -687,7 +717,7 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
                                *scene.output.grain, height));
     }
     issues = rules.issues;
-    if (!filling) return {};
+    if (!filling || std::ranges::any_of(rules.issues, [](const Issue& i) { return i.severity == Severity::Error; })) return {};
     return CheckedScene{std::move(scene), std::move(rules.issues), std::move(*filling)};
 }
 

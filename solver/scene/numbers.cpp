@@ -5,6 +5,8 @@
 
 namespace kuzure::scene {
 
+double resting_speed(const Scene& s) { return 0.05 * std::sqrt(length(s.effects.gravity.value_or(Vector{})) * s.space.spacing); }
+
 std::vector<Indicator> dimensionless_numbers(const Scene& s, const Filling& f)
 {
     std::vector<Indicator> all;

@@ -12,6 +12,9 @@ struct Indicator {
     std::string warning; // or empty
 };
 
+/// Soil that is slower rests: 0.05 sqrt(g spacing), m/s; 0 without gravity.
+double resting_speed(const Scene&);
+
 /// What a soil's keys mean for this scene.
 struct SoilNumbers {
     std::string name;

@@ -151,6 +151,31 @@ TEST_F(CheckpointTest, RefusesWhatIsNotAWholeCheckpoint)
     EXPECT_THAT(refusal(dir / "other.h5"), HasSubstr("not a checkpoint"));
 }
 
+TEST_F(CheckpointTest, TablesComeBackAndTheirDamageIsSeen)
+{
+    const io::CheckpointTable cells{"cells", "m,s", 2, {1, 2, 3, 1e300, -0.0, 0.1}}, more{"more", "1", 1, {123456.789}};
+    const auto file = io::write_checkpoint(alone, dir, some(10, 3), "hash", "{}", std::array{cells, more}).path();
+    const auto good = io::verify_checkpoint(alone, file);
+    EXPECT_EQ(io::read_checkpoint_table(alone, good, "cells", 2), cells.rows);
+    EXPECT_EQ(io::read_checkpoint_table(alone, good, "more", 1), more.rows);
+    EXPECT_FALSE(io::read_checkpoint_table(alone, good, "others", 1));
+    EXPECT_THROW(io::read_checkpoint_table(alone, good, "cells", 3), IoFailed);
+
+    // One bit of the number that stands nowhere else.
+    std::string bytes = io::read_text(file);
+    const auto at = bytes.find(std::string(reinterpret_cast<const char*>(more.rows.data()), sizeof(double)));
+    ASSERT_NE(at, bytes.npos);
+    flip_bit(file, 8 * at + 3);
+    try {
+        io::verify_checkpoint(alone, file);
+        FAIL();
+    } catch (const IoFailed& e) {
+        EXPECT_THAT(e.what(), HasSubstr("checksum of /tables/more"));
+    }
+    const auto plain = io::verify_checkpoint(alone, io::write_checkpoint(alone, dir, some(10, 3), "hash", "{}"));
+    EXPECT_FALSE(io::read_checkpoint_table(alone, plain, "cells", 2));
+}
+
 TEST_F(CheckpointTest, RefusesAFieldItDoesNotHave)
 {
     const auto file = io::write_checkpoint(alone, dir, some(10, 3), "hash", "{}").path();

@@ -2,6 +2,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/app/cli/command.hpp"
 #include "solver/app/report/scene_facts.hpp"
+#include "solver/app/run/maps.hpp"
 #include "solver/app/scaling/predict.hpp"
 #include "solver/app/study/dial.hpp"
 #include "solver/kernels/pair_model.hpp"
@@ -60,6 +61,7 @@ Exit print_facts(const Comm& comm, const Arguments& a)
     std::vector<std::string> warnings;
     for (const auto& issue : scene_warnings) warnings.push_back(in_words(issue));
     const io::Path where = s.output.directory.empty() ? io::Path("results") : io::Path(s.output.directory);
+    if (s.maps) points_of_maps(comm, s, filling, [&](const std::string& w) { warnings.push_back(w); });
     if (const auto why = a.machine.empty() ? does_not_fit(comm, e, where) : std::string(); !why.empty())
         warnings.push_back("on this machine kuzure run would refuse this scene: " + why);
     if (comm.rank() != 0) return Exit::Ok;

@@ -70,12 +70,14 @@ double peak_speed_of(const io::Checkpoint& from)
     return j.is_object() && j.contains("peak_speed") && j["peak_speed"].is_number() ? j["peak_speed"].get<double>() : 0;
 }
 
-void Checkpoints::write(const Simulation& sim, double peak_speed)
+void Checkpoints::write(const Simulation& sim, double peak_speed, const Maps* maps)
 {
     directory_.require_owned();
     auto header = nlohmann::ordered_json::parse(clock_text(sim));
     header["peak_speed"] = peak_speed;
-    last_ = io::write_checkpoint(comm_, directory_.place(), sim.particles(), hash_, header.dump());
+    std::vector<io::CheckpointTable> tables;
+    if (maps) header["maps"] = maps->header(), tables.push_back(maps->table());
+    last_ = io::write_checkpoint(comm_, directory_.place(), sim.particles(), hash_, header.dump(), tables);
 }
 
 std::string Checkpoints::last_in_words() const

@@ -2,6 +2,7 @@
 // A run's checkpoints: what they hold beside the particles, which run may go on from one, which is the newest good one.
 #include "io/checkpoint.hpp"
 #include "io/result_directory.hpp"
+#include "solver/app/run/maps.hpp"
 #include "solver/run/simulation.hpp"
 #include <string>
 
@@ -29,8 +30,9 @@ public:
     }
     /// The one that the run goes on from.
     void went_on_from(io::Place file) { last_ = std::move(file); }
-    /// Collective: the newest one. `peak_speed`: the greatest speed (m/s) of all legs. Throws CheckpointFailed, IoFailed.
-    void write(const Simulation&, double peak_speed);
+    /// Collective: the newest one. `peak_speed`: the greatest speed (m/s) of all legs; `maps`: those of the run, or nullptr. Throws
+    /// CheckpointFailed, IoFailed.
+    void write(const Simulation&, double peak_speed, const Maps* maps);
     const io::Place& last() const { return last_; }
     /// Half a sentence that begins with a full stop, to be put behind what failed.
     std::string last_in_words() const;

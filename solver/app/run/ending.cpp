@@ -84,6 +84,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
                          {"at_rest", settled->at_rest}};
     if (volume > 0) j["resting_volume_ratio"] = volume;
     if (outputs.fronts()) j["soil_off_ground"] = outputs.fronts()->off_ground;
+    if (outputs.maps() && !outputs.maps()->summary().is_null()) j["maps"] = outputs.maps()->summary();
     if (facts_.with_twins && code == Exit::Ok) {
         io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, directory_.path(), facts_.peak_speed, facts_.twins); });
         if (messages_.speaks())

@@ -1,4 +1,5 @@
 #include "solver/app/run/fronts.hpp"
+#include "solver/scene/numbers.hpp"
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -94,7 +95,7 @@ Fronts measure_fronts(const Comm& comm, const Particles& p, const Scene& s, cons
 
 double resting_volume_ratio(const Comm& comm, const Particles& p, const Scene& scene, const scene::Filling& filling)
 {
-    const double slow = 0.05 * std::sqrt(length(scene.effects.gravity.value_or(Vector{})) * scene.space.spacing);
+    const double slow = scene::resting_speed(scene);
     // In whole units of 2^-32: the same sum on any ranks.
     std::int64_t count = 0, sum = 0;
     for (Index i = 0; i < p.size(); ++i) {

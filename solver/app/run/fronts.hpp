@@ -17,7 +17,7 @@ struct Fronts {
 /// Collective; heights count from the lowest soil at the start.
 Fronts measure_fronts(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 
-/// Collective. Mean rho_0/rho of the soil that rests, which moves slower than 0.05 sqrt(g spacing); 0 where none does.
+/// Collective. Mean rho_0/rho of the soil that rests, which moves slower than scene::resting_speed(); 0 where none does.
 double resting_volume_ratio(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 
 } // namespace kuzure

@@ -46,7 +46,22 @@ void Outputs::open(std::optional<double> restart)
     progress_.emplace(comm_, directory_.progress(), restart);
 }
 
-void Outputs::take_back(double time) { open(time); }
+void Outputs::begin_maps(Simulation& sim, std::vector<io::NamedPoint> points, const std::optional<KeptMaps>& kept,
+                         std::optional<double> restart)
+{
+    maps_.emplace(comm_, scene_, directory_, sim, std::move(points), kept, restart);
+}
+
+void Outputs::write_maps(Simulation& sim)
+{
+    if (maps_) maps_->write(sim, Maps::Pictures::Draw);
+}
+
+void Outputs::take_back(double time)
+{
+    open(time);
+    if (maps_) maps_->take_back(time);
+}
 
 void Outputs::begin_loop(const Simulation& sim)
 {
@@ -61,7 +76,13 @@ void Outputs::write_due(Simulation& sim, double before, bool last)
     if (due(scene_.output.history, t, before) || last || before < 0) {
         if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(sim); });
     }
+    if (maps_) {
+        if (before >= 0 && t > before) maps_->after_step(sim);
+        // A hundred rows show how the front went where the scene does not say how many.
+        if (due(scene_.output.history.value_or(scene_.time.end / 100), t, before) || last || before < 0) maps_->write_front(sim);
+    }
     if (due(scene_.output.every, t, before) || last || before < 0) {
+        if (maps_) maps_->write(sim, last ? Maps::Pictures::Draw : Maps::Pictures::Leave);
         if (!snapshots_->last_time() || t > *snapshots_->last_time()) sim.timers().timed(Phase::Snapshot, [&] { write_snapshot(sim, {}); });
     }
 }
@@ -100,8 +121,9 @@ void Outputs::write_snapshot(const Simulation& sim, std::optional<std::int64_t> 
     snapshots_->write(sim.particles(), walls_, label);
 }
 
-void Outputs::write_failure(const Simulation& sim)
+void Outputs::write_failure(Simulation& sim)
 {
+    write_maps(sim);
     // Its picture has a ring around the particle to blame.
     if (!snapshots_->last_time() || sim.time() > *snapshots_->last_time()) write_snapshot(sim, sim.failed_id());
 }

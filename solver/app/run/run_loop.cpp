@@ -72,6 +72,12 @@ private:
             require_same_scene(comm_, *from, scene_);
             if (!here) require_room_for(comm_, *from, where, facts_.scene_hash);
         }
+        std::vector<io::NamedPoint> points;
+        std::optional<KeptMaps> kept;
+        if (scene_.maps) {
+            points = points_of_maps(comm_, scene_, *filling_, [&](const std::string& w) { messages_.warn(w); });
+            if (from) kept = maps_of(comm_, *from, scene_, *filling_);
+        }
         RunOptions options{args_.plain ? Arithmetic::Scalar : Arithmetic::Simd, args_.recut_every};
         const double done = from ? std::clamp(clock_from_text(from->header, from->file).time / scene_.time.end, 0.0, 1.0) : 0;
         const Estimate e = estimate(scene_, *filling_, *choose_model(scene_, options.arithmetic));
@@ -89,6 +95,7 @@ private:
         }
         write_scene();
         outputs_.emplace(comm_, scene_, *directory_, *sim_, restart_time, facts_.start);
+        if (scene_.maps) outputs_->begin_maps(*sim_, std::move(points), kept, restart_time);
         messages_.say(fmt::format("{}\n{} soil and {} wall particles, {} ranks x {} threads, {}", scene_.title,
                                   sim_->filling().soil_count(), sim_->filling().wall_count(), comm_.size(), threads_,
                                   sim_->model().name()));
@@ -210,6 +217,7 @@ private:
                 if (asked.stop && !sim.finished()) {
                     write_checkpoint();
                     show_status(true);
+                    outputs_->write_maps(sim);
                     ending().write(sim, *outputs_, "stopped", Exit::Stopped);
                     return say_stopped();
                 }
@@ -256,7 +264,7 @@ private:
     {
         sim_->timers().timed(Phase::Checkpoint, [&] {
             outputs_->sync();
-            checkpoints_->write(*sim_, facts_.peak_speed);
+            checkpoints_->write(*sim_, facts_.peak_speed, outputs_->maps() ? &*outputs_->maps() : nullptr);
         });
         if (stop_) stop_->checkpoint_written();
     }

@@ -1,0 +1,24 @@
+#pragma once
+// A map as a picture: colours over the shaded ground, outlines, coordinates, scale bar, north arrow.
+#include "io/map_style.hpp"
+#include "solver/scene/contour.hpp"
+#include <functional>
+
+namespace kuzure::io {
+
+struct MapPicture {
+    MapKind kind;
+    std::string title;
+    scene::Grid values;                                    // in the coordinates of the map; NaN: clear
+    std::function<double(double x, double y)> ground = {}; // m, in the same coordinates, NaN where there is none; empty: level
+    struct Outline {
+        double limit; // m
+        std::vector<scene::Area> areas;
+    };
+    std::vector<Outline> outlines; // of h_max
+};
+
+/// The bytes of a PNG that shows where there are values, and some of what is around them. Throws BadInput where can_draw() is false.
+std::string map_png(const MapPicture&);
+
+} // namespace kuzure::io
