@@ -332,6 +332,25 @@ def main():
     )
     check(hashed("out/scene.toml") == want, "and reads back to the same scene")
 
+    launcher = ["mpirun", "-n", "2", program, "run", "s.toml", "-o", "two", "--threads", "1", "--set", "time.end=0.001"]
+    done = subprocess.run(launcher, capture_output=True, text=True, timeout=120, cwd=work)
+    states = [
+        json.load(open(path(f"{d}/summary.json")))["state_hash"] if done.returncode == 0 else done.stderr[-500:] for d in ("out", "two")
+    ]
+    check(states[0] == states[1], f"two ranks give the same bits: {states}")
+    facts = told(call("check", "s.toml", "--json")[1])["ground"]
+    one = facts["releases"][0]
+    check(
+        facts["origin"] == [-1696, -12796] and facts["crs"].endswith("(EPSG:6670)") and facts["cell"] == CELL,
+        f"kuzure check says where the ground lies: {facts}",
+    )
+    check(
+        abs(one["volume"] / 2880 - 1) < 0.02
+        and abs(one["mean_thickness"] - 4) < 0.01
+        and one["bed"] == "the elevation model less the thickness",
+        f"and how large the mass is: {one}",
+    )
+
     # ---- doubtful
     doubts = {
         "edge": ([], "the edge of the ground lies within reach"),
