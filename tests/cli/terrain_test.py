@@ -351,6 +351,18 @@ def main():
         f"and how large the mass is: {one}",
     )
 
+    for words, changes in {
+        'surface = "rough"': [("friction = 24.0", 'surface = "rough"')],
+        'surface = "smooth"': [("friction = 24.0", 'surface = "smooth"')],
+        'edge = "closed"': [("friction = 24.0", 'friction = 24.0\nedge = "closed"')],
+    }.items():
+        write("words.toml", scene(*changes))
+        said = call("check", "words.toml")[1]
+        check(
+            words in said and re.fullmatch("[0-9a-f]{16}", hashed("words.toml")) and hashed("words.toml") != want,
+            f"{words} is written as it was read",
+        )
+
     # ---- doubtful
     doubts = {
         "edge": ([], "the edge of the ground lies within reach"),
