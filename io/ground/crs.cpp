@@ -75,17 +75,24 @@ std::string wkt_of(PJ_CONTEXT* c, const PJ* p, PJ_WKT_TYPE type = PJ_WKT2_2019)
     return text ? text : "";
 }
 
-/// EPSG's own system where this one is the same and says so with confidence.
+/// EPSG's own system where this one is the same and says so with confidence: one text for one system, whatever file it came from.
 Pj known(PJ_CONTEXT* c, Pj p)
 {
-    if (const char* id = proj_get_id_code(p.get(), 0); id && *id) return p;
-    int* confidence = nullptr;
-    PJ_OBJ_LIST* found = proj_identify(c, p.get(), "EPSG", nullptr, &confidence);
-    Pj best;
-    if (found && proj_list_get_count(found) > 0 && confidence[0] >= 90) best.reset(proj_list_get(c, found, 0));
-    proj_int_list_destroy(confidence);
-    proj_list_destroy(found);
-    return best ? std::move(best) : std::move(p);
+    const auto number = [](const Pj& x) -> std::string {
+        const char *code = proj_get_id_code(x.get(), 0), *authority = proj_get_id_auth_name(x.get(), 0);
+        return code && authority && std::string(authority) == "EPSG" ? code : "";
+    };
+    std::string code = number(p);
+    if (code.empty()) {
+        int* confidence = nullptr;
+        PJ_OBJ_LIST* found = proj_identify(c, p.get(), "EPSG", nullptr, &confidence);
+        if (found && proj_list_get_count(found) > 0 && confidence[0] >= 90) code = number(Pj(proj_list_get(c, found, 0)));
+        proj_int_list_destroy(confidence);
+        proj_list_destroy(found);
+    }
+    if (code.empty()) return p;
+    Pj own(proj_create_from_database(c, "EPSG", code.c_str(), PJ_CATEGORY_CRS, 0, nullptr));
+    return own ? std::move(own) : std::move(p);
 }
 
 Pj made(PJ_CONTEXT* c, const std::string& wkt)

@@ -2,7 +2,7 @@
 #include "io/ground/ground.hpp"
 #include "io/ground/crs.hpp"
 #include "io/ground/formats.hpp"
-#include "io/ground/vectors.hpp"
+#include "io/ground/loading.hpp"
 #include "solver/scene/draped.hpp"
 #include <algorithm>
 #include <cmath>
@@ -10,42 +10,21 @@
 #include <fmt/ranges.h>
 
 namespace kuzure::io {
-namespace {
 
-constexpr double none = std::numeric_limits<double>::quiet_NaN();
-const double reach_slope = std::tan(11 * 3.14159265358979323846 / 180); // what flows comes to rest above this line, as nearly all have
-constexpr double most_doubtful_slope = 55;                              // deg: beyond it layers of particles lie close along the normal
+namespace ground {
 
-/// What is wrong, at a key of the scene.
-struct Refused {
-    std::string key, text;
-};
-/// What the work on a key throws, with the key.
-template <class Work> auto at_key(const std::string& key, Work work)
+std::string cell_text(const scene::Grid& g, int i, int j) { return fmt::format("({:.10g}, {:.10g})", g.x + i * g.cell, g.y + j * g.cell); }
+std::string shown(const Window& w)
 {
-    try {
-        return work();
-    } catch (const BadInput& e) {
-        throw Refused{key, e.what()};
-    } catch (const IoFailed& e) {
-        throw Refused{key, e.what()};
-    }
+    return fmt::format("x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", w.low_x, w.high_x, w.low_y, w.high_y);
 }
+std::string dem_files(const Scene& scene) { return fmt::format("{}", fmt::join(scene.terrain->dem, ", ")); }
 
-/// A release with what its files say, in map coordinates.
-struct Mass {
-    scene::Release* release;
-    std::string key; // "body.0.release"
-    std::vector<Outline> outlines;
-    std::vector<scene::Ring> rings; // of all
-    Window box;                     // around it
-    // On the grid of the ground:
-    std::vector<double> thickness, bed; // NaN: none
-};
+} // namespace ground
 
-struct Place {
-    int i = 0, j = 0;
-};
+using namespace ground;
+
+namespace {
 
 class Loader {
 public:
@@ -62,7 +41,7 @@ public:
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (auto* r = std::get_if<scene::Release>(&scene_.bodies[b].shape)) read_outline(*r, fmt::format("body.{}.release", b));
         read_heights(mosaic);
-        for (auto& m : masses_) thickness_and_bed(m);
+        for (auto& m : masses_) thickness_and_bed(m, dem_, crs_, scene_, issues_);
         finish();
         return std::move(issues_);
     }
@@ -71,11 +50,6 @@ private:
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
     double x_of(int i) const { return dem_.x + i * dem_.cell; }
     double y_of(int j) const { return dem_.y + j * dem_.cell; }
-    std::string cell_text(int i, int j) const { return fmt::format("({:.10g}, {:.10g})", x_of(i), y_of(j)); }
-    static std::string shown(const Window& w)
-    {
-        return fmt::format("x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", w.low_x, w.high_x, w.low_y, w.high_y);
-    }
     template <class Visit> void for_each_cell(Visit visit) const
     {
         for (int j = 0; j < dem_.rows; ++j)
@@ -257,14 +231,14 @@ private:
             if (z < -11000 || z > 9000)
                 throw Refused{"terrain.dem", fmt::format("{}: the cell at {} has a height of {} m, which no place on Earth has. Remedy: if "
                                                          "it means no data: gdal_translate -a_nodata {} in.tif out.tif",
-                                                         fmt::join(terrain_.dem, ", "), cell_text(i, j), z, z)};
+                                                         dem_files(scene_), cell_text(dem_, i, j), z, z)};
             low = std::min(low, z), high = std::max(high, z);
             whole = whole && z == std::floor(z);
         });
         if (!(low <= high))
             throw Refused{terrain_.window ? "terrain.window" : "terrain.dem",
-                          fmt::format("{}: no cell at {} has a height. Remedy: another window, or files that cover it",
-                                      fmt::join(terrain_.dem, ", "), shown(extent_of(dem_)))};
+                          fmt::format("{}: no cell at {} has a height. Remedy: another window, or files that cover it", dem_files(scene_),
+                                      shown(extent_of(dem_)))};
         if (low == high) warn("terrain.dem", fmt::format("all heights are {} m: is this the elevation model?", low));
         else if (whole)
             warn("terrain.dem", "all heights are whole metres: slopes become stairs. Remedy: an elevation model with decimals, or gdalwarp "
@@ -280,215 +254,6 @@ private:
                  fmt::format(
                      "one spacing ({} m) is {:.1f} cells of the elevation model ({} m): what the ground has between them is averaged away",
                      scene_.space.spacing, scene_.space.spacing / dem_.cell, dem_.cell));
-    }
-
-    bool in(const Mass& m, int i, int j) const { return m.rings.empty() || inside(m.rings, x_of(i), y_of(j)); }
-
-    /// Gives cells without a value that touch cells with one the mean of these, some times over: an outline cuts between cells.
-    void extend(std::vector<double>& values, int times) const
-    {
-        for (int t = 0; t < times; ++t) {
-            auto next = values;
-            for_each_cell([&](int i, int j, std::size_t k) {
-                if (!std::isnan(values[k])) return;
-                double sum = 0;
-                int n = 0;
-                for (int b = std::max(j - 1, 0); b <= std::min(j + 1, dem_.rows - 1); ++b)
-                    for (int a = std::max(i - 1, 0); a <= std::min(i + 1, dem_.columns - 1); ++a) {
-                        const double x = values[std::size_t(b) * std::size_t(dem_.columns) + std::size_t(a)];
-                        if (!std::isnan(x)) sum += x, ++n;
-                    }
-                if (n > 0) next[k] = sum / n;
-            });
-            values = std::move(next);
-        }
-    }
-
-    void thickness_and_bed(Mass& m)
-    {
-        scene::Release& r = *m.release;
-        const std::size_t n = dem_.values.size();
-        const auto& z = dem_.values;
-        m.bed.assign(n, none);
-        const auto read = [&](const std::string& which, const std::string& file) {
-            return at_key(m.key + which, [&] { return onto(file, dem_, crs_); });
-        };
-        // The outline must lie on ground, with a cell around it for the slopes.
-        if (!m.rings.empty()) {
-            const Window w = extent_of(dem_);
-            const double rim = 2 * dem_.cell;
-            for (const auto& ring : m.rings)
-                for (const auto& p : ring)
-                    if (p[0] < w.low_x + rim || p[0] > w.high_x - rim || p[1] < w.low_y + rim || p[1] > w.high_y - rim)
-                        throw Refused{m.key + ".outline",
-                                      fmt::format("{}: its corner ({:.10g}, {:.10g}) lies outside the ground, or within two cells of its "
-                                                  "edge ({}). Remedy: a larger window or elevation model, or another outline",
-                                                  r.outline, p[0], p[1], shown(w))};
-        }
-        const auto refuse_gap = [&](const std::string& which, const std::string& file, int i, int j) {
-            throw Refused{m.key + which, fmt::format("{}: no data at {} under the release. Remedy: fill the hole (gdal_fillnodata.py, or "
-                                                     "another file behind it in terrain.dem), or another outline",
-                                                     file, cell_text(i, j))};
-        };
-        const auto dem_file = fmt::format("{}", fmt::join(terrain_.dem, ", "));
-        std::vector<double> t(n, none); // m, NaN: not known
-        if (r.thickness) {
-            std::fill(t.begin(), t.end(), *r.thickness);
-        } else if (!r.thickness_map.empty()) {
-            t = read(".thickness_map", r.thickness_map);
-            for_each_cell([&](int i, int j, std::size_t k) {
-                if (t[k] < 0)
-                    throw Refused{m.key + ".thickness_map", fmt::format("{}: expected thicknesses from 0, found {} m at {}. Remedy: "
-                                                                        "gdal_calc.py, or declare it no data: gdal_translate -a_nodata {}",
-                                                                        r.thickness_map, t[k], cell_text(i, j), t[k])};
-            });
-        } else if (!r.surface.empty()) {
-            const auto slip = read(".surface", r.surface);
-            for_each_cell([&](int i, int j, std::size_t k) {
-                if (m.rings.empty() ? std::isnan(slip[k]) : !in(m, i, j)) {
-                    if (!std::isnan(slip[k]) && !std::isnan(z[k])) t[k] = std::max(0.0, z[k] - slip[k]);
-                    return;
-                }
-                if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
-                if (std::isnan(slip[k])) refuse_gap(".surface", r.surface, i, j);
-                if (!m.rings.empty() && slip[k] > z[k] + 0.5)
-                    throw Refused{m.key + ".surface",
-                                  fmt::format("{}: the slip surface lies {:.2f} m above the ground at {}, inside the outline: a thickness "
-                                              "below 0. Remedy: check the heights of both, or the outline",
-                                              r.surface, slip[k] - z[k], cell_text(i, j))};
-                t[k] = std::max(0.0, z[k] - slip[k]);
-                if (t[k] > 0) m.bed[k] = slip[k];
-            });
-        } else if (!r.before.empty()) {
-            const auto before = read(".before", r.before), after = read(".after", r.after);
-            double square = 0;
-            std::size_t outside = 0;
-            for_each_cell([&](int i, int j, std::size_t k) {
-                const bool here = !m.rings.empty() && in(m, i, j);
-                if (here && std::isnan(before[k])) refuse_gap(".before", r.before, i, j);
-                if (here && std::isnan(after[k])) refuse_gap(".after", r.after, i, j);
-                if (std::isnan(before[k]) || std::isnan(after[k])) return;
-                const double d = before[k] - after[k];
-                if (!here && !m.rings.empty()) square += d * d, ++outside;
-                t[k] = std::max(0.0, d);
-                if (here || (m.rings.empty() && d > 0)) m.bed[k] = after[k];
-            });
-            if (outside > 0 && std::sqrt(square / double(outside)) > 0.5)
-                warn(m.key, fmt::format("before and after differ by {:.2f} m (root mean square) outside the outline too: one is shifted, "
-                                        "or has trees, or the deposit is in the window",
-                                        std::sqrt(square / double(outside))));
-        } else {
-            for_each_cell([&](int i, int j, std::size_t k) {
-                for (const auto& o : m.outlines)
-                    if (std::isnan(t[k]) && inside(o.rings, x_of(i), y_of(j))) t[k] = *o.thickness;
-            });
-        }
-
-        // Inside, ground must be known; the bed follows.
-        double sum = 0, thickest = 0;
-        std::size_t cells = 0;
-        for_each_cell([&](int i, int j, std::size_t k) {
-            const bool here = m.rings.empty() ? t[k] > 0 : in(m, i, j);
-            if (!here) return;
-            if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
-            if (std::isnan(t[k]) && !r.thickness_map.empty()) refuse_gap(".thickness_map", r.thickness_map, i, j);
-            if (std::isnan(t[k]) || !(t[k] > 0)) return;
-            sum += t[k], ++cells, thickest = std::max(thickest, t[k]);
-            if (std::isnan(m.bed[k])) m.bed[k] = r.on_top ? z[k] : z[k] - t[k];
-        });
-        if (cells == 0)
-            throw Refused{
-                m.key, !r.before.empty() ? "the ground is nowhere lower after than before: no mass. Remedy: are before and after exchanged?"
-                       : !r.surface.empty() ? "the slip surface is nowhere below the ground: no mass. Remedy: check the heights of both"
-                                            : "no cell of the elevation model lies inside: no mass. Remedy: an elevation model with "
-                                              "smaller cells, or a larger outline"};
-        const double a = double(cells) * dem_.cell * dem_.cell, volume = sum * dem_.cell * dem_.cell, mean = volume / a;
-        if (const double share = volume / std::pow(a, 1.5); share < 0.003 || share > 0.5)
-            warn(m.key, fmt::format("a volume of {:.3g} m^3 on {:.3g} m^2 (mean thickness {:.2f} m) is {:.1f} % of area^1.5, where slides "
-                                    "have about 1 to 20 %: check outline and thickness",
-                                    volume, a, mean, 100 * share));
-        if (dem_.cell > thickest)
-            warn("terrain.dem",
-                 fmt::format("its cells ({} m) are coarser than the release is thick ({:.2f} m at most)", dem_.cell, thickest));
-        if (mean < 6 * scene_.space.spacing)
-            warn("space.spacing",
-                 fmt::format(
-                     "the release is {:.1f} layers of particles thick on average; below 6 its reach is rough. Remedy: spacing = {:.2g}",
-                     mean / scene_.space.spacing, mean / 6));
-        if (!r.thickness) {
-            if (m.rings.empty()) {
-                for (double& x : t)
-                    if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
-            } else {
-                // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
-                for_each_cell([&](int i, int j, std::size_t k) {
-                    if (t[k] == 0 && !in(m, i, j)) t[k] = none;
-                });
-                extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
-            }
-        }
-        m.thickness = std::move(t);
-        check_reach(m);
-    }
-
-    /// What is missing or steep where the mass may go.
-    void check_reach(const Mass& m)
-    {
-        double top = -std::numeric_limits<double>::infinity();
-        const auto& z = dem_.values;
-        for_each_cell([&](int, int, std::size_t k) {
-            if (!std::isnan(m.bed[k])) top = std::max(top, z[k]);
-        });
-        double low = top;
-        for (const double h : z)
-            if (h < low) low = h;
-        const double way = (top - low) / reach_slope; // the farthest that soil can come
-        const Window& b = m.box;
-        std::size_t missing = 0, steep = 0, known = 0;
-        double steepest = 0;
-        Place where;
-        const auto distance = [&](double x, double y) {
-            return std::hypot(std::max({b.low_x - x, x - b.high_x, 0.0}), std::max({b.low_y - y, y - b.high_y, 0.0}));
-        };
-        for_each_cell([&](int i, int j, std::size_t k) {
-            const double d = distance(x_of(i), y_of(j));
-            if (d > way) return;
-            if (std::isnan(z[k])) {
-                ++missing;
-                return;
-            }
-            if (z[k] > top - reach_slope * d) return;
-            ++known;
-            if (i == 0 || j == 0 || i + 1 == dem_.columns || j + 1 == dem_.rows) return;
-            const double sx = (dem_.at(i + 1, j) - dem_.at(i - 1, j)) / (2 * dem_.cell),
-                         sy = (dem_.at(i, j + 1) - dem_.at(i, j - 1)) / (2 * dem_.cell);
-            const double slope = std::atan(std::hypot(sx, sy)) * 180 / 3.14159265358979323846;
-            if (slope > most_doubtful_slope) ++steep;
-            if (slope > steepest) steepest = slope, where = {i, j};
-        });
-        // Beyond the edge: cells of the circle that are not there. Only where the ground at the edge can be reached.
-        std::size_t beyond = 0;
-        const auto edge_reached = [&](int i, int j) {
-            return !std::isnan(dem_.at(i, j)) && dem_.at(i, j) <= top - reach_slope * distance(x_of(i), y_of(j));
-        };
-        std::size_t edge = 0, edges = 0;
-        for (int i = 0; i < dem_.columns; ++i) edges += 2, edge += edge_reached(i, 0), edge += edge_reached(i, dem_.rows - 1);
-        for (int j = 0; j < dem_.rows; ++j) edges += 2, edge += edge_reached(0, j), edge += edge_reached(dem_.columns - 1, j);
-        beyond = edge;
-        if (missing > 0)
-            warn("terrain.dem", fmt::format("{:.2g} % of the cells within reach of {} (the line of 11 degrees from its top) have no data: "
-                                            "soil that comes there is lost",
-                                            100 * double(missing) / double(missing + known), m.key));
-        if (beyond > 0)
-            warn(terrain_.window ? "terrain.window" : "terrain.dem",
-                 fmt::format("the edge of the ground lies within reach of {} (the line of 11 degrees from its top): {:.2g} % of its edge "
-                             "can be passed. Remedy: a larger {}",
-                             m.key, 100 * double(beyond) / double(edges), terrain_.window ? "window" : "elevation model"));
-        if (steep > 0)
-            warn("terrain.dem",
-                 fmt::format(
-                     "{} cells within reach of {} are steeper than {} degrees, up to {:.0f} at {}: layers of particles lie close there",
-                     steep, m.key, most_doubtful_slope, steepest, cell_text(where.i, where.j)));
     }
 
     /// Grids in local metres, the wall, the frame.

@@ -67,7 +67,7 @@ Tiff open(const Path& path)
 {
     set_up_libtiff();
     last_words.clear();
-    Tiff t(XTIFFOpen(path.c_str(), "r"));
+    Tiff t(XTIFFOpen(path.c_str(), "rm")); // not mapped: a window of a huge file takes its own memory only
     if (!t)
         throw BadInput(fmt::format("{}: cannot be read as a TIFF: {}. Remedy: copy it again, or make it anew with gdal_translate",
                                    path.string(), last_words));

@@ -194,7 +194,7 @@ CASES = {
     "no_young": ([("young = 1.8e6", "")], r"soil\.sand\.young: expected a number in Pa"),
     "no_poisson": ([("poisson = 0.3", "")], r"soil\.sand\.poisson: expected a number"),
     "no_body_soil": ([('soil = "sand"', "")], r":14: body\.0\.soil: expected a string, found nothing"),
-    "no_shape": ([(BOX, "")], r":14: body\.0: expected exactly one of box, cylinder, sphere, polygon, found none"),
+    "no_shape": ([(BOX, "")], r":14: body\.0: expected exactly one of box, cylinder, sphere, polygon, release, found none"),
     "two_shapes": (
         [(BOX, BOX + "\nsphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }")],
         r"body\.0: expected exactly one of .* found box and sphere",

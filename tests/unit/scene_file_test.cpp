@@ -446,6 +446,7 @@ TEST(SceneKeys, EveryWordOfAChoiceIsWrittenAsItWasRead)
     int words = 0;
     for (const auto& key : io::scene_keys()) {
         if (key.kind != io::Kind::Choice && key.kind != io::Kind::ChoiceOrTable) continue;
+        if (key.path.starts_with("terrain.")) continue; // needs files: tests/cli/terrain_test.py
         auto path = key.path;
         if (const auto star = path.find('*'); star != path.npos) path.replace(star, 1, path.starts_with("soil") ? "sand" : "0");
         std::set<std::string> hashes;

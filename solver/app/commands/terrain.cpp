@@ -51,14 +51,19 @@ Facts facts_of(const Arguments& a)
         throw BadInput(fmt::format("--window: it meets no cell of {}, which lies at x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", a.file,
                                    e.low_x, e.high_x, e.low_y, e.high_y));
     }
-    f.metres = io::metres_of_cell(f.raster.grid, f.info.crs);
+    const auto all = f.info.extent();
+    const bool degrees = !f.info.crs.empty() && io::is_geographic(f.info.crs);
+    const bool mistaken = degrees && (all.low_x < -360.01 || all.high_x > 360.01 || all.low_y < -90.01 || all.high_y > 90.01);
+    f.metres = io::metres_of_cell(f.raster.grid, mistaken ? "" : f.info.crs);
     f.relief = io::relief(f.raster.grid, f.metres[0], f.metres[1]);
     const auto& r = f.relief;
     if (f.info.crs.empty()) f.warnings.push_back("it names no system of coordinates: a scene needs terrain.crs");
-    else if (io::is_geographic(f.info.crs)) {
-        const auto e = f.info.extent();
+    else if (mistaken)
+        f.warnings.push_back("it says it is in degrees, and lies where only metres can be: a scene refuses it. Remedy: its true system, "
+                             "gdal_translate -a_srs EPSG:N in.tif out.tif");
+    else if (degrees) {
         f.warnings.push_back(fmt::format("it is in degrees: a scene projects it to terrain.crs, for instance \"{}\"",
-                                         io::utm_zone(0.5 * (e.low_x + e.high_x), 0.5 * (e.low_y + e.high_y))));
+                                         io::utm_zone(0.5 * (all.low_x + all.high_x), 0.5 * (all.low_y + all.high_y))));
     }
     if (r.missing < r.cells && r.lowest == r.highest) f.warnings.push_back("all heights are the same");
     else if (r.whole_numbers) f.warnings.push_back("all heights are whole metres: slopes become stairs");
@@ -93,7 +98,7 @@ std::string to_text(const Arguments& a, const Facts& f)
     const auto& g = f.raster.grid;
     const auto e = io::extent_of(g);
     const auto& r = f.relief;
-    const bool degrees = !f.info.crs.empty() && io::is_geographic(f.info.crs);
+    const bool degrees = f.metres[0] != g.cell;
     std::string out = fmt::format("{}: {}, {}\n", a.file, f.info.format, f.info.numbers);
     const auto row = [&](const char* name, const std::string& text) { out += fmt::format("  {:<12} {}\n", name, text); };
     row("system", f.info.crs.empty() ? "none named" : io::crs_name(f.info.crs));

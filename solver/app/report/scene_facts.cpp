@@ -1,9 +1,12 @@
 #include "solver/app/report/scene_facts.hpp"
+#include "io/ground/crs.hpp"
 #include "io/scene_file.hpp"
 #include "io/summary.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/height_field.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
+#include "solver/scene/shape.hpp"
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
@@ -77,6 +80,66 @@ std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
 
 } // namespace
 
+namespace {
+
+/// The heights of real ground; nothing where a scene has none.
+const scene::HeightField* ground_of(const Scene& s)
+{
+    for (const auto& wall : s.walls)
+        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) return g->field.get();
+    return nullptr;
+}
+
+const char* bed_of(const scene::Release& r)
+{
+    if (!r.surface.empty()) return "the slip surface";
+    if (!r.after.empty()) return "the elevation model after";
+    return r.on_top ? "the elevation model" : "the elevation model less the thickness";
+}
+
+nlohmann::ordered_json ground_json(const Scene& s, const scene::HeightField& field)
+{
+    const scene::Grid& g = field.grid();
+    nlohmann::ordered_json j{{"crs", io::crs_name(s.map_frame.crs)},
+                             {"origin", {s.map_frame.x, s.map_frame.y}},
+                             {"columns", g.columns},
+                             {"rows", g.rows},
+                             {"cell", g.cell},
+                             {"lowest", field.lowest()},
+                             {"highest", field.highest()},
+                             {"releases", nlohmann::ordered_json::array()}};
+    for (std::size_t b = 0; b < s.bodies.size(); ++b)
+        if (const auto* r = std::get_if<scene::Release>(&s.bodies[b].shape)) {
+            const auto e = scene::extent(*r);
+            const double mean = e.area > 0 ? e.volume / e.area : 0;
+            j["releases"].push_back({{"body", b},
+                                     {"volume", e.volume},
+                                     {"area", e.area},
+                                     {"mean_thickness", mean},
+                                     {"greatest_thickness", e.thickest},
+                                     {"layers", mean / s.space.spacing},
+                                     {"bed", bed_of(*r)}});
+        }
+    return j;
+}
+
+std::string ground_text(const Scene& s, const scene::HeightField& field)
+{
+    const auto j = ground_json(s, field);
+    auto text =
+        fmt::format("  ground      {} x {} cells of {:g} m, {:.1f} to {:.1f} m high, the scene's origin at ({:.10g}, {:.10g}) in {}\n",
+                    field.grid().columns, field.grid().rows, field.grid().cell, field.lowest(), field.highest(), s.map_frame.x,
+                    s.map_frame.y, io::crs_name(s.map_frame.crs));
+    for (const auto& r : j["releases"])
+        text += fmt::format(
+            "  release     body.{}: {:.4g} m^3 on {:.4g} m^2, {:.2f} m thick on average ({:.1f} layers), {:.2f} m at most; its bed is {}\n",
+            r["body"].get<int>(), r["volume"].get<double>(), r["area"].get<double>(), r["mean_thickness"].get<double>(),
+            r["layers"].get<double>(), r["greatest_thickness"].get<double>(), r["bed"].get<std::string>());
+    return text;
+}
+
+} // namespace
+
 nlohmann::ordered_json to_json(const SceneFacts& f)
 {
     const Scene& s = f.scene;
@@ -98,6 +161,7 @@ nlohmann::ordered_json to_json(const SceneFacts& f)
                              {"effects", io::effects_json(s.notes)},
                              {"numbers", numbers},
                              {"warnings", f.warnings}};
+    if (const auto* field = ground_of(s)) j["ground"] = ground_json(s, *field);
     return j;
 }
 
@@ -114,6 +178,7 @@ std::string to_text(const SceneFacts& f)
     add("  particles   {} soil, {} wall, {:g} m apart, {}-D\n", e.soil, e.walls, s.space.spacing, s.dimensions);
     add("  step        {:.3g} s{}, {}{} steps to {:g} s\n", e.dt, s.time.step ? " (fixed)" : " (follows the motion)",
         s.time.step ? "" : "about ", e.steps, s.time.end);
+    if (const auto* field = ground_of(s)) text += ground_text(s, *field);
     add("  pair model  {}\n", f.pair_model);
     add("  memory      {} in all, disk {}\n", bytes_text(f.memory), bytes_text(e.disk()));
     add("  time        about {} on {}\n\n", forecast_text(f.time), f.where);
