@@ -1,3 +1,4 @@
+// Beyond 400 lines: one algorithm in one class, its steps in the order in which a round of it goes.
 #include "decomposition/even_out.hpp"
 #include "decomposition/rim.hpp"
 #include <algorithm>
@@ -49,7 +50,7 @@ struct Part {
     double halo() const;
     BlockOwners table() const;
 
-    // Ranks by their place in `ranks`, this one first.
+    // Ranks by their index in `ranks`, this one first.
     int rank;
     std::vector<int> ranks;
     std::map<int, int> index_of_rank;
@@ -64,7 +65,7 @@ struct Part {
 
     double work = 0;
     int blocks = 0;
-    std::vector<double> flow, load; // to and of each rank by its place; zero and infinite for those that are no peers
+    std::vector<double> flow, load; // to and of each rank by its index; zero and infinite for those that are no peers
     std::vector<double> phi, ties;
     std::int64_t given = 0;
     double busy = 0; // s
@@ -74,7 +75,7 @@ private:
         int block, to;
     };
     int index_of(int r);
-    /// Whether a block touches one that this rank (by place) had at the start and still has.
+    /// Whether a block touches one that this rank (by index) had at the start and still has.
     template <class Eligible> bool rooted(int b, int q, Eligible eligible) const;
     /// Whether the rest of the own blocks hangs together as before without this one.
     bool can_spare(int b);

@@ -17,10 +17,10 @@ struct Halo::Impl {
     // Of each channel, one request per peer over MPI: first the receives, then the sends. Own images have none.
     std::vector<std::vector<MPI_Request>> channels;
     int n_receives = 0;
-    std::vector<int> in_of_receive; // receive request -> place in in_
-    std::vector<int> send_of_out;   // place in out_ -> send request, or -1
-    int self = -1;                  // place of the own images in in_
-    std::vector<int> ready;         // places in in_ that have arrived and are not handed over
+    std::vector<int> in_of_receive; // receive request -> index in in_
+    std::vector<int> send_of_out;   // index in out_ -> send request, or -1
+    int self = -1;                  // index of the own images in in_
+    std::vector<int> ready;         // indices in in_ that have arrived and are not handed over
     int outstanding = 0;            // receives that have not arrived
     std::vector<int> finished;      // room for MPI_Testsome, MPI_Waitsome
     bool in_flight = false;

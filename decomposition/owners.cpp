@@ -10,7 +10,7 @@ int BlockOwners::owner_of(const Block& b, const std::array<std::int32_t, 3>& per
     if (block_.empty()) return 0;
     if (const int k = index_of(b); k >= 0) return owner_[k];
 
-    // (largest difference, squared distance, lexicographic place): the least wins.
+    // (largest difference, squared distance, lexicographic position): the least wins.
     using Rank = std::tuple<std::int64_t, std::int64_t, int>;
     const auto rank_of = [&](int k) {
         std::int64_t largest = 0, squared = 0;

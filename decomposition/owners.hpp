@@ -25,7 +25,7 @@ public:
     std::span<const int> owners() const { return owner_; }
 
 private:
-    /// Place of a wrapped block in block_, or -1.
+    /// Index of a wrapped block in block_, or -1.
     int index_of(const Block& b) const
     {
         const auto at = std::ranges::lower_bound(block_, b);

@@ -15,7 +15,7 @@ namespace kuzure {
 /// Name and version of the library that cuts graphs.
 std::string partitioner_library();
 
-/// Place of a block in the grid of blocks, by axis.
+/// Position of a block in the grid of blocks, by axis.
 using Block = std::array<std::int32_t, 3>;
 
 /// Blocks reach from -block_limit to block_limit - 1 on each axis.
@@ -26,7 +26,7 @@ inline bool within_limit(const Block& b)
     return std::ranges::all_of(b, [](std::int32_t c) { return c >= -block_limit && c < block_limit; });
 }
 
-/// A block's place as one number. Only for blocks within the limit.
+/// A block's position as one number. Only for blocks within the limit.
 inline std::uint64_t key_of(const Block& b)
 {
     std::uint64_t k = 0;
@@ -34,7 +34,7 @@ inline std::uint64_t key_of(const Block& b)
     return k;
 }
 
-/// A block's place within the periods (blocks by axis; 0: open).
+/// A block's position within the periods (blocks by axis; 0: open).
 inline Block wrapped(Block b, const std::array<std::int32_t, 3>& period)
 {
     for (int a = 0; a < 3; ++a) {
@@ -45,7 +45,7 @@ inline Block wrapped(Block b, const std::array<std::int32_t, 3>& period)
     return b;
 }
 
-/// From blocks to their place in a list.
+/// From blocks to their index in a list.
 class BlockIndex {
 public:
     void reserve(std::size_t n) { at_.reserve(n); }
@@ -139,7 +139,7 @@ struct BlockCut {
 /// its work. Without listers labels are free: parts of neighbouring numbers lie near each other. Throws as block_graph().
 BlockCut cut_blocks(std::span<const BlockWork> listed, std::span<const int> lister, const BlockGrid&, int parts, Method = Method::Metis);
 
-/// Place of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004) 381.
+/// Index of a point of the grid 0 .. 2^bits - 1 along the Hilbert curve. Skilling, AIP Conf. Proc. 707 (2004) 381.
 std::uint64_t hilbert_index(std::array<std::uint32_t, 3> point, int bits);
 
 } // namespace kuzure

@@ -35,6 +35,8 @@ std::string Key::expected() const
         return "two numbers [from, to]" + of_unit;
     case Kind::Points:
         return "an array of corners [x, z]" + of_unit;
+    case Kind::Window:
+        return "four numbers [x from, y from, x to, y to]" + of_unit;
     case Kind::Numbers:
         return "an array of numbers" + of_unit + limits;
     case Kind::Choice:
@@ -51,6 +53,8 @@ std::string Key::expected() const
         return fmt::format("tables [{}.<name>]", path);
     case Kind::Texts:
         return "an array of strings";
+    case Kind::TextOrTexts:
+        return "a string or an array of strings";
     case Kind::TextOrTrue:
         return "a string or true";
     case Kind::Settings:

@@ -17,6 +17,7 @@ enum class Kind {
     Vector,        // [x, y, z]
     Pair,          // [from, to]
     Points,        // [[x, z], ...]
+    Window,        // [x from, y from, x to, y to]
     Numbers,       // an array of numbers
     Choice,        // one of the choices
     Choices,       // an array of them, each at most once
@@ -25,6 +26,7 @@ enum class Kind {
     Tables,        // [[...]], any number of tables
     Named,         // [....name], any number of tables with names
     Texts,         // an array of strings
+    TextOrTexts,   // a string, or an array of them
     TextOrTrue,    // a string, or true
     Settings       // a table, or one of several, in which any key may stand beside those that have rows
 };

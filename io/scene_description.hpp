@@ -67,6 +67,73 @@ template <class A> void describe_shape(A& a, const std::string& path, scene::Sha
         });
 }
 
+/// Soil that lies on real ground within an outline.
+template <class A> void describe_release(A& a, const std::string& path, scene::Shape& shape)
+{
+    const auto file = [](const char* example, const char* doc) {
+        return KeyInfo{.optional = true, .example = example, .doc = doc, .role = Role::Bookkeeping}; // its content counts
+    };
+    a.template alternative<scene::Release>(
+        path + ".release", shape,
+        {.example = "{ outline = \"scar.shp\", thickness = 4.5 }",
+         .doc = "the mass that fails on the ground of [terrain]: one of thickness, thickness_map, surface, or before and after "
+                "(docs/terrain.md)"},
+        [&](const std::string& p, auto& s) {
+            a.text(p + ".outline", s.outline,
+                   file("\"scar.shp\"", "polygons of a .shp or GeoJSON; their attribute \"thickness\" (m) counts where no other is named"));
+            a.number(p + ".thickness", s.thickness,
+                     {.unit = "m", .range = size, .example = "4.5", .doc = "thickness along z, everywhere the same"});
+            a.text(p + ".thickness_map", s.thickness_map, file("\"thickness.tif\"", "raster of thicknesses along z in m"));
+            a.text(p + ".surface", s.surface,
+                   file("\"slip.tif\"", "raster of the slip surface: the mass is what the elevation model has above it"));
+            a.text(p + ".before", s.before, file("\"before.tif\"", "elevation model before the failure, together with after"));
+            a.text(p + ".after", s.after, file("\"after.tif\"", "elevation model after it, which becomes the bed"));
+            a.flag(p + ".on_top", s.on_top,
+                   {.fallback = "false",
+                    .example = "true",
+                    .doc = "with thickness or thickness_map: the elevation model is the bed and the mass lies on it; else its top"});
+        });
+}
+
+template <class A> void describe_terrain(A& a, std::optional<scene::Terrain>& terrain)
+{
+    a.part("terrain", terrain,
+           {.example = "{ dem = \"dem.tif\", friction = 24.0 }",
+            .doc = "real ground from elevation models, a wall of its own (docs/terrain.md)"},
+           [&](const std::string& p, auto& t) {
+               a.files(p + ".dem", t.dem,
+                       {.example = "\"dem.tif\"",
+                        .doc = "elevation models (GeoTIFF, ESRI ASCII, GSI's .xml or .zip); of several a later one fills what earlier ones "
+                               "leave open",
+                        .role = Role::Bookkeeping});
+               a.text(p + ".crs", t.crs,
+                      {.optional = true,
+                       .example = "\"EPSG:6670\"",
+                       .doc = "system of the map, in metres; needed where the files name none, or degrees",
+                       .role = Role::Bookkeeping});
+               a.window(p + ".window", t.window,
+                        {.unit = "m",
+                         .range = coordinate,
+                         .example = "[-2000.0, 11000.0, -500.0, 13000.0]",
+                         .doc = "part of the map that is read, in its coordinates; without it what releases can reach (11 degrees)"});
+               a.choice(p + ".surface", t.surface,
+                        {{"coulomb", scene::Surface::Coulomb}, {"rough", scene::Surface::Rough}, {"smooth", scene::Surface::Smooth}},
+                        {.fallback = "\"coulomb\"",
+                         .example = "\"rough\"",
+                         .doc = "\"coulomb\": slips against friction, \"rough\": no slip, \"smooth\": free slip"});
+               a.angle(p + ".friction", t.friction_angle,
+                       {.unit = "deg",
+                        .range = {.low = 0, .high = 90, .low_open = true, .high_open = true},
+                        .optional = true,
+                        .example = "24.0",
+                        .doc = "Coulomb friction of the ground; needed unless surface is \"rough\" or \"smooth\""});
+               a.choice(p + ".edge", t.edge, {{"open", scene::Edge::Open}, {"closed", scene::Edge::Closed}},
+                        {.fallback = "\"open\"",
+                         .example = "\"closed\"",
+                         .doc = "\"open\": soil that leaves the ground is counted and gone; \"closed\": it ends the run (exit 3)"});
+           });
+}
+
 template <class A> void describe_soil(A& a, const std::string& path, scene::Soil& soil)
 {
     a.number(path + ".density", soil.density,
@@ -340,6 +407,7 @@ template <class A> void describe(A& a, Scene& s)
              [&](const std::string& path, scene::Body& body) {
                  a.soil_of(path + ".soil", body.soil, s.soils, {.example = "\"sand\"", .doc = "name of the soil it is made of"});
                  describe_shape(a, path, body.shape);
+                 describe_release(a, path, body.shape);
                  a.vector(path + ".velocity", body.velocity,
                           {.unit = "m/s",
                            .range = between(-1e6, 1e6),
@@ -365,6 +433,7 @@ template <class A> void describe(A& a, Scene& s)
                      });
              });
 
+    describe_terrain(a, s.terrain);
     a.section("start",
               {.fallback = "{}", .example = "{ from = \"results/settled\" }", .doc = "the state to start from", .role = Role::Bookkeeping});
     a.text("start.from", s.start.from,

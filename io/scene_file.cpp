@@ -1,5 +1,6 @@
 #include "io/scene_file.hpp"
 #include "io/document.hpp"
+#include "io/ground/ground.hpp"
 #include "io/scene_description.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
@@ -47,7 +48,10 @@ public:
     {
         optionally(path, to, [&](double& x) { number(path, x, k); });
     }
-    void angle(const std::string& path, double& to, const KeyInfo&) { to = file_.number(path) * radians_per_degree; }
+    void angle(const std::string& path, double& to, const KeyInfo& k)
+    {
+        if (!k.optional || file_.find(path)) to = file_.number(path) * radians_per_degree;
+    }
     void vector(const std::string& path, Vector& to, const KeyInfo&)
     {
         const auto& array = *file_.at(path).as_array();
@@ -64,6 +68,16 @@ public:
     void numbers(const std::string& path, std::vector<double>& to, const KeyInfo&)
     {
         for (const auto& x : *file_.at(path).as_array()) to.push_back(number_of(x));
+    }
+    void files(const std::string& path, std::vector<std::string>& to, const KeyInfo&)
+    {
+        to = file_.at(path).is_string() ? std::vector{file_.text(path)} : file_.texts(path);
+    }
+    void window(const std::string& path, std::optional<std::array<double, 4>>& to, const KeyInfo&)
+    {
+        optionally(path, to, [&](std::array<double, 4>& w) {
+            for (std::size_t k = 0; k < 4; ++k) w[k] = number_of(*file_.at(path).as_array()->get(k));
+        });
     }
     void points(const std::string& path, std::vector<std::array<double, 2>>& to, const KeyInfo&)
     {
@@ -165,7 +179,16 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
     };
     absolute(scene.start.from);
     if (scene.maps) absolute(scene.maps->points);
+    if (scene.terrain)
+        for (auto& dem : scene.terrain->dem) absolute(dem);
+    for (auto& body : scene.bodies)
+        if (auto* r = std::get_if<scene::Release>(&body.shape))
+            for (auto* path : {&r->outline, &r->thickness_map, &r->surface, &r->before, &r->after}) absolute(*path);
 
+    auto doubtful = load_ground(scene);
+    for (const auto& issue : doubtful)
+        if (issue.severity == scene::Severity::Error) file.complain(issue.key, issue.text);
+    file.throw_if_any();
     scene::resolve(scene);
     scene::Issues issues;
     auto checked = scene::check_and_fill(std::move(scene), limit, issues);
@@ -175,6 +198,7 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
                                          ? issue.text
                                          : fmt::format("{} ({} is at {})", issue.text, issue.other, file.location(issue.other)));
     file.throw_if_any();
+    checked->warnings.insert(checked->warnings.begin(), doubtful.begin(), doubtful.end());
     return std::move(*checked);
 }
 

@@ -53,6 +53,11 @@ public:
     }
     void pair(const std::string& path, const std::array<double, 2>&, const KeyInfo& k) { add(path, Kind::Pair, k); }
     void numbers(const std::string& path, const std::vector<double>&, const KeyInfo& k) { add(path, Kind::Numbers, k); }
+    void files(const std::string& path, const std::vector<std::string>&, const KeyInfo& k) { add(path, Kind::TextOrTexts, k); }
+    void window(const std::string& path, const std::optional<std::array<double, 4>>&, const KeyInfo& k)
+    {
+        add(path, Kind::Window, k).need = Need::Optional;
+    }
     void points(const std::string& path, const std::vector<std::array<double, 2>>&, const KeyInfo& k) { add(path, Kind::Points, k); }
     void axes(const std::string& path, const std::array<bool, 3>&, const KeyInfo& k)
     {

@@ -34,6 +34,8 @@ std::string shown_value(const Key& key)
         return "[from, to]";
     case Kind::Points:
         return "[[x, z], ...]";
+    case Kind::Window:
+        return "[x from, y from, x to, y to]";
     case Kind::Numbers:
         return "array of numbers";
     case Kind::Choice:
@@ -46,6 +48,8 @@ std::string shown_value(const Key& key)
         return "table";
     case Kind::Texts:
         return "array of strings";
+    case Kind::TextOrTexts:
+        return "string or array of strings";
     case Kind::TextOrTrue:
         return "string or true";
     case Kind::Settings:
@@ -117,6 +121,8 @@ Json value_schema(const Key& key)
         return array_of(number_schema(key, "number"), 3, 3);
     case Kind::Pair:
         return array_of(number_schema(key, "number"), 2, 2);
+    case Kind::Window:
+        return array_of(number_schema(key, "number"), 4, 4);
     case Kind::Points:
         return array_of(array_of(number_schema(key, "number"), 2, 2), 0);
     case Kind::Numbers:
@@ -141,6 +147,8 @@ Json value_schema(const Key& key)
                 {"minProperties", 1}};
     case Kind::Texts:
         return array_of({{"type", "string"}}, 0);
+    case Kind::TextOrTexts:
+        return {{"anyOf", Json::array({Json{{"type", "string"}}, array_of({{"type", "string"}}, 1)})}};
     case Kind::TextOrTrue:
         return {{"anyOf", Json::array({Json{{"type", "string"}}, Json{{"const", true}}})}};
     case Kind::Settings: {

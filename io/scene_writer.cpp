@@ -1,4 +1,5 @@
 // A scene as text: with every default written out, and as the lines of which its hash is taken.
+#include "io/ground/ground.hpp"
 #include "io/scene_description.hpp"
 #include "io/scene_file.hpp"
 #include "solver/core/ensure.hpp"
@@ -70,7 +71,11 @@ public:
     }
     void number(const std::string& path, double x, const KeyInfo& k) { k.optional&& x == 0 ? absent(path) : emit(path, digits(x)); }
     void number(const std::string& path, const std::optional<double>& x, const KeyInfo& k) { x ? number(path, *x, k) : absent(path); }
-    void angle(const std::string& path, double x, const KeyInfo&) { emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x)); }
+    void angle(const std::string& path, double x, const KeyInfo& k)
+    {
+        if (k.optional && x == 0) absent(path);
+        else emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x));
+    }
     void vector(const std::string& path, const Vector& v, const KeyInfo&)
     {
         emit(path, fmt::format("[{}, {}, {}]", digits(v.x), digits(v.y), digits(v.z)));
@@ -85,6 +90,17 @@ public:
         std::vector<std::string> texts;
         for (const double x : xs) texts.push_back(digits(x));
         emit(path, fmt::format("[{}]", fmt::join(texts, ", ")));
+    }
+    void files(const std::string& path, const std::vector<std::string>& names, const KeyInfo&)
+    {
+        std::vector<std::string> texts;
+        for (const auto& name : names) texts.push_back(toml_string(name));
+        emit(path, texts.size() == 1 ? texts[0] : fmt::format("[{}]", fmt::join(texts, ", ")));
+    }
+    void window(const std::string& path, const std::optional<std::array<double, 4>>& w, const KeyInfo&)
+    {
+        if (w) emit(path, fmt::format("[{}, {}, {}, {}]", digits((*w)[0]), digits((*w)[1]), digits((*w)[2]), digits((*w)[3])));
+        else absent(path);
     }
     void points(const std::string& path, const std::vector<std::array<double, 2>>& ps, const KeyInfo&)
     {
@@ -169,10 +185,11 @@ private:
     void emit(const std::string& path, const std::string& value)
     {
         const Key& key = *scene_keys().find(path);
+        if (purpose_ == Purpose::Hash && key.role != Role::Physics) return;
         if (inline_) {
             *inline_ += fmt::format("{}{} = {}", inline_->empty() ? "" : ", ", key.leaf(), value);
         } else if (purpose_ == Purpose::Hash) {
-            if (key.role == Role::Physics) out += fmt::format("{} = {}\n", path, value);
+            out += fmt::format("{} = {}\n", path, value);
         } else {
             const auto line = fmt::format("{} = {}", key.leaf(), value);
             out += key.unit.empty() || key.unit == "1" ? line + "\n" : fmt::format("{:<40} # {}\n", line, key.unit);
@@ -197,11 +214,32 @@ private:
     std::string* inline_ = nullptr;
 };
 
+/// What files of maps have given: their content counts, not where they lie.
+void write_ground(const Scene& scene, std::string& out)
+{
+    for (const auto& wall : scene.walls)
+        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) out += fmt::format("terrain.heights = {}\n", digest(g->field->grid()));
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        const auto* r = std::get_if<scene::Release>(&scene.bodies[b].shape);
+        if (!r) continue;
+        scene::Grid corners;
+        for (const auto& ring : r->rings) {
+            for (const auto& p : ring) corners.values.insert(corners.values.end(), {p[0], p[1]});
+            corners.values.push_back(std::numeric_limits<double>::quiet_NaN());
+        }
+        out += fmt::format("body.{}.release.rings = {}\n", b, digest(corners));
+        if (r->thicknesses) out += fmt::format("body.{}.release.thicknesses = {}\n", b, digest(*r->thicknesses));
+    }
+}
+
 std::string written(const Scene& scene, Purpose purpose)
 {
     Writer writer(purpose);
     Scene copy = scene;
+    // The ground is said by [terrain].
+    std::erase_if(copy.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
     describe(writer, copy);
+    if (purpose == Purpose::Hash) write_ground(scene, writer.out);
     return writer.out;
 }
 

@@ -9,7 +9,17 @@
 Finished points are not run again: call it again after an interruption, or when batch jobs have ended. Leaves in DIR (default
 results/scaling/NAME): points.csv, report.md, efficiency.svg/png, losses.svg/png, and every run's own directory.
 Exit codes as kuzure's: 0, 2 the file is wrong, 3 layouts of the same soil ended with different bits, 4 a run failed."""
-import argparse, csv, difflib, json, math, os, re, shutil, statistics, subprocess, sys, tomllib
+# Beyond 400 lines: one tool that runs from a checkout without anything beside it.
+import argparse
+import csv
+import difflib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
@@ -33,8 +43,13 @@ class Wrong(Exception):
 
 
 # ---------------------------------------------------------------------------------------------- the scaling file
-KEYS = {"": ["title", "kind", "repeats", "steps_per_output", "set", "here", "machine", "quick", "case"], "here": ["layouts", "threads"], "machine": ["nodes"],
-        "quick": ["repeats", "set"], "case": ["series", "scene", "share", "tiles", "set"]}
+KEYS = {
+    "": ["title", "kind", "repeats", "steps_per_output", "set", "here", "machine", "quick", "case"],
+    "here": ["layouts", "threads"],
+    "machine": ["nodes"],
+    "quick": ["repeats", "set"],
+    "case": ["series", "scene", "share", "tiles", "set"],
+}
 
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")  # of series: it becomes directories, figures' labels and jobs' names
@@ -50,11 +65,27 @@ texts = kinds(lambda v: isinstance(v, list) and all(isinstance(x, str) and x.isp
 wholes = lambda v, n: isinstance(v, list) and all(whole(x)[0] for x in v) and (n is None or len(v) == n)
 table = kinds(lambda v: isinstance(v, dict), "a table")
 # What the value of each key must be.
-VALUES = {"title": text, "kind": text, "scene": text, "set": texts, "repeats": whole, "steps_per_output": whole, "share": whole, "threads": whole,
-          "series": kinds(lambda v: isinstance(v, str) and NAME.fullmatch(v) and len(v) <= 60, "a name of letters, digits and _ . + -, beginning with one of the first two"),
-          "tiles": kinds(lambda v: wholes(v, 2), "two whole numbers from 1"), "nodes": kinds(lambda v: wholes(v, None) and v, "an array of whole numbers from 1"),
-          "layouts": kinds(lambda v: isinstance(v, list) and v and all(wholes(x, 2) for x in v), "an array of [ranks, threads]"),
-          "here": table, "machine": table, "quick": table, "case": kinds(lambda v: isinstance(v, list) and all(isinstance(x, dict) for x in v), "tables [[case]]")}
+VALUES = {
+    "title": text,
+    "kind": text,
+    "scene": text,
+    "set": texts,
+    "repeats": whole,
+    "steps_per_output": whole,
+    "share": whole,
+    "threads": whole,
+    "series": kinds(
+        lambda v: isinstance(v, str) and NAME.fullmatch(v) and len(v) <= 60,
+        "a name of letters, digits and _ . + -, beginning with one of the first two",
+    ),
+    "tiles": kinds(lambda v: wholes(v, 2), "two whole numbers from 1"),
+    "nodes": kinds(lambda v: wholes(v, None) and v, "an array of whole numbers from 1"),
+    "layouts": kinds(lambda v: isinstance(v, list) and v and all(wholes(x, 2) for x in v), "an array of [ranks, threads]"),
+    "here": table,
+    "machine": table,
+    "quick": table,
+    "case": kinds(lambda v: isinstance(v, list) and all(isinstance(x, dict) for x in v), "tables [[case]]"),
+}
 
 
 def in_gnuplot(words):
@@ -92,13 +123,15 @@ def read_plan(path):
     for case in plan["case"]:
         check(case, "case")
         if "scene" not in case:
-            raise Wrong(f"{path}: case: expected scene = \"path\", found {case}")
+            raise Wrong(f'{path}: case: expected scene = "path", found {case}')
         case["scene"] = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(path)), case["scene"]))
         if not os.path.exists(case["scene"]):
             raise Wrong(f"{path}: case: scene: found no file {case['scene']}")
         case.setdefault("series", os.path.splitext(os.path.basename(case["scene"]))[0])
         if not NAME.fullmatch(case["series"]):
-            raise Wrong(f'{path}: case: series: the name of the scene file, {case["series"]!r}, is no name for directories; give series = "..."')
+            raise Wrong(
+                f'{path}: case: series: the name of the scene file, {case["series"]!r}, is no name for directories; give series = "..."'
+            )
         if plan["kind"] == "weak" and "share" not in case:
             raise Wrong(f"{path}: case: share: expected the number of ranks of this case, found nothing")
     return plan
@@ -150,7 +183,9 @@ def points_of(plan, args, profile):
             layouts = [(1, r, t, r * t) for r, t in plan.get("here", {}).get("layouts", [[1, 1]])]
         for nodes, ranks, threads, cores in layouts:
             name = f"{series}-{nodes}n{ranks}x{threads}" if profile else f"{series}-{ranks}x{threads}"
-            out.append(dict(name=name, series=series, scene=case["scene"], nodes=nodes, ranks=ranks, threads=threads, cores=cores, set=sets))
+            out.append(
+                dict(name=name, series=series, scene=case["scene"], nodes=nodes, ranks=ranks, threads=threads, cores=cores, set=sets)
+            )
     names = [p["name"] for p in out]
     if len(set(names)) < len(names):
         raise Wrong(f"{args.plan}: two points are called {next(n for n in names if names.count(n) > 1)}; give their cases different series")
@@ -194,7 +229,9 @@ def set_arguments(point):
 
 def surroundings():
     """The environment with the settings of jobs/environment.sh: Open MPI's, and KUZURE_CORES."""
-    done = subprocess.run(["bash", "-c", 'source "$1" && env -0', "_", os.path.join(ROOT, "jobs/environment.sh")], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ["bash", "-c", 'source "$1" && env -0', "_", os.path.join(ROOT, "jobs/environment.sh")], capture_output=True, text=True, check=True
+    )
     environment = dict(line.split("=", 1) for line in done.stdout.split("\0") if line)
     environment.pop("OMP_NUM_THREADS", None)
     return environment
@@ -207,7 +244,9 @@ def run_here(points, repeats, out, kuzure):
     can = [p for p in points if p["cores"] <= cores]
     for p in points:
         if p not in can:
-            print(f"{p['name']}: needs {p['cores']} cores, this host has {cores}: not run here (--machine NAME makes a job of it)", flush=True)
+            print(
+                f"{p['name']}: needs {p['cores']} cores, this host has {cores}: not run here (--machine NAME makes a job of it)", flush=True
+            )
     for k in range(repeats):
         for p in can:
             directory = os.path.join(out, p["name"], f"run_{k}")
@@ -294,11 +333,26 @@ def collected(points, repeats, out, steps_per_output):
         runs.sort(key=lambda r: r[0])
         _, directory, summary, timers = runs[len(runs) // 2]
         cost = costs(summary, timers, p["cores"], steps_per_output)
-        rows.append(dict(point=p["name"], series=p["series"], nodes=p["nodes"], ranks=p["ranks"], threads=p["threads"], cores=p["cores"],
-                         soil=summary["soil_particles"], steps=timers["steps"], runs=len(runs), ms_step=1e3 * runs[len(runs) // 2][0],
-                         ms_low=1e3 * runs[0][0], ms_high=1e3 * runs[-1][0],
-                         balance=timers["pair_loop"]["seconds"]["max"] / max(1e-12, timers["pair_loop"]["seconds"]["mean"]),
-                         hash=summary["state_hash"], core_ns=sum(cost.values()), **{f"ns {g}": c for g, c in cost.items()}))
+        rows.append(
+            dict(
+                point=p["name"],
+                series=p["series"],
+                nodes=p["nodes"],
+                ranks=p["ranks"],
+                threads=p["threads"],
+                cores=p["cores"],
+                soil=summary["soil_particles"],
+                steps=timers["steps"],
+                runs=len(runs),
+                ms_step=1e3 * runs[len(runs) // 2][0],
+                ms_low=1e3 * runs[0][0],
+                ms_high=1e3 * runs[-1][0],
+                balance=timers["pair_loop"]["seconds"]["max"] / max(1e-12, timers["pair_loop"]["seconds"]["mean"]),
+                hash=summary["state_hash"],
+                core_ns=sum(cost.values()),
+                **{f"ns {g}": c for g, c in cost.items()},
+            )
+        )
     # Against the fewest cores of the series (threads before ranks: one rank has nobody to talk to).
     for series in {r["series"] for r in rows}:
         mine = [r for r in rows if r["series"] == series]
@@ -317,7 +371,10 @@ def plot(out, name, commands):
     head = """set border 3 lc rgb '#404040'; set tics nomirror textcolor rgb '#404040'; set grid lc rgb '#e4e4e4'
 set key outside right top Left reverse samplen 2
 """
-    for ending, terminal in (("svg", "svg size 900,480 font 'DejaVu Sans,13' lw 1.3 background rgb 'white'"), ("png", "pngcairo size 900,480 font 'DejaVu Sans,11' lw 1.3")):
+    for ending, terminal in (
+        ("svg", "svg size 900,480 font 'DejaVu Sans,13' lw 1.3 background rgb 'white'"),
+        ("png", "pngcairo size 900,480 font 'DejaVu Sans,11' lw 1.3"),
+    ):
         text = f"set terminal {terminal}\nset output '{name}.{ending}'\n{head}{commands}"
         done = subprocess.run(["gnuplot"], input=text, cwd=out, capture_output=True, text=True)
         if done.returncode != 0:
@@ -326,24 +383,38 @@ set key outside right top Left reverse samplen 2
 
 def draw(rows, out):
     series = list(dict.fromkeys(r["series"] for r in rows))
-    block = lambda name, chosen: f"${name} << EOD\n" + "".join(f"{r['cores']} {r['efficiency']} \"{r['ranks']}x{r['threads']}\"\n" for r in chosen) + "EOD\n"
+    block = (
+        lambda name, chosen: f"${name} << EOD\n"
+        + "".join(f"{r['cores']} {r['efficiency']} \"{r['ranks']}x{r['threads']}\"\n" for r in chosen)
+        + "EOD\n"
+    )
     data, lines = "", []
     for k, s in enumerate(series):
         mine = sorted((r for r in rows if r["series"] == s), key=lambda r: (r["cores"], r["efficiency"]))
         best = list({r["cores"]: r for r in mine}.values())  # the line joins the best layouts
         data += block(f"s{k}", mine) + block(f"b{k}", best)
         colour = f"lc rgb '{COLOURS[k % len(COLOURS)]}'"
-        lines.append(f"$b{k} using 1:2 with lines {colour} notitle, $s{k} using 1:2 with points pt 7 {colour} title {in_gnuplot(s)} noenhanced, "
-                     f"$s{k} using 1:2:3 with labels offset 0,1 font ',9' notitle")
+        lines.append(
+            f"$b{k} using 1:2 with lines {colour} notitle, $s{k} using 1:2 with points pt 7 {colour} title {in_gnuplot(s)} noenhanced, "
+            f"$s{k} using 1:2:3 with labels offset 0,1 font ',9' notitle"
+        )
     lines = ", ".join(lines)
     top = max(1.0, max(r["efficiency"] for r in rows)) + 0.1
-    plot(out, "efficiency", f"{data}set logscale x 2\nset xrange [{0.7 * min(r['cores'] for r in rows)}:{1.4 * max(r['cores'] for r in rows)}]\n"
-         f"set yrange [0:{top}]\nset xlabel 'cores (labels: ranks x threads)'\nset ylabel 'efficiency of a core'\nplot 1 lc rgb '#b0b0b0' notitle, {lines}\n")
+    plot(
+        out,
+        "efficiency",
+        f"{data}set logscale x 2\nset xrange [{0.7 * min(r['cores'] for r in rows)}:{1.4 * max(r['cores'] for r in rows)}]\n"
+        f"set yrange [0:{top}]\nset xlabel 'cores (labels: ranks x threads)'\nset ylabel 'efficiency of a core'\nplot 1 lc rgb '#b0b0b0' notitle, {lines}\n",
+    )
     # Each bar is the cost of a particle and step in core-ns, by what it goes to.
     table = "".join(f"\"{r['point']}\" " + " ".join(f"{max(0.0, r['ns ' + g]):.6g}" for g in GROUPS) + "\n" for r in rows)
     bars = ", ".join(f"$d using {k + 2}:xtic(1) lc rgb '{COLOURS[k]}' title '{g}'" for k, g in enumerate(GROUPS))
-    plot(out, "losses", f"$d << EOD\n{table}EOD\nset style data histograms\nset style histogram rowstacked\nset style fill solid 0.9 border lc rgb 'white'\n"
-         f"set boxwidth 0.7\nset yrange [0:*]\nset xtics rotate by -25 font ',10' noenhanced\nset ylabel 'core-ns for a soil particle and step'\nplot {bars}\n")
+    plot(
+        out,
+        "losses",
+        f"$d << EOD\n{table}EOD\nset style data histograms\nset style histogram rowstacked\nset style fill solid 0.9 border lc rgb 'white'\n"
+        f"set boxwidth 0.7\nset yrange [0:*]\nset xtics rotate by -25 font ',10' noenhanced\nset ylabel 'core-ns for a soil particle and step'\nplot {bars}\n",
+    )
 
 
 def percent(x):
@@ -351,31 +422,60 @@ def percent(x):
 
 
 def report(plan, rows, points, out, where):
-    text = [f"# {plan['title']}", "", f"{where}; {len(rows)} of {len(points)} points have results. Median of the repeats.", "",
-            "| point | nodes | ranks x threads | soil | ms a step (lowest..highest) | core-ns a particle and step | speed-up | efficiency | slowest rank / mean |",
-            "|---|---|---|---|---|---|---|---|---|"]
+    text = [
+        f"# {plan['title']}",
+        "",
+        f"{where}; {len(rows)} of {len(points)} points have results. Median of the repeats.",
+        "",
+        "| point | nodes | ranks x threads | soil | ms a step (lowest..highest) | core-ns a particle and step | speed-up | efficiency | slowest rank / mean |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
     for r in rows:
-        text.append(f"| {r['point']} | {r['nodes']} | {r['ranks']} x {r['threads']} | {r['soil']:,} | {r['ms_step']:.3g} ({r['ms_low']:.3g}..{r['ms_high']:.3g}) | "
-                    f"{r['core_ns']:.4g} | {r['speedup']:.3f} | {r['efficiency']:.3f} | {r['balance']:.3f} |")
-    text += ["", "![efficiency](efficiency.svg)", "", "## Where the efficiency goes",
-             "Share of a core's time that the reference of the series (fewest cores) does not spend; negative is a gain. The rows add up to 1 - efficiency.", "",
-             "| point | lost | " + " | ".join(GROUPS) + " | largest |", "|---|---|" + "---|" * (len(GROUPS) + 1)]
+        text.append(
+            f"| {r['point']} | {r['nodes']} | {r['ranks']} x {r['threads']} | {r['soil']:,} | {r['ms_step']:.3g} ({r['ms_low']:.3g}..{r['ms_high']:.3g}) | "
+            f"{r['core_ns']:.4g} | {r['speedup']:.3f} | {r['efficiency']:.3f} | {r['balance']:.3f} |"
+        )
+    text += [
+        "",
+        "![efficiency](efficiency.svg)",
+        "",
+        "## Where the efficiency goes",
+        "Share of a core's time that the reference of the series (fewest cores) does not spend; negative is a gain. The rows add up to 1 - efficiency.",
+        "",
+        "| point | lost | " + " | ".join(GROUPS) + " | largest |",
+        "|---|---|" + "---|" * (len(GROUPS) + 1),
+    ]
     for r in rows:
         if r["base"]:
             text.append(f"| {r['point']} | reference |" + " |" * (len(GROUPS) + 1))
             continue
         worst = max(GROUPS, key=lambda g: r[f"lost {g}"])
         named = f"**{worst}**" if r[f"lost {worst}"] > 0 else "none"
-        text.append(f"| {r['point']} | {percent(1 - r['efficiency'])} | " + " | ".join(percent(r[f'lost {g}']) for g in GROUPS) + f" | {named} |")
-    text += ["", "![losses](losses.svg)", "",
-             "kernel: pair loops and update on the mean rank. imbalance: what the slowest rank computes longer than the mean, taken out of the waits. halo: packing,",
-             "ghost plans and what remains of the wait for halo. I/O: " + (f"snapshot, picture and checkpoint once in {plan['steps_per_output']} steps, as in a long run, and history."
-             if plan.get("steps_per_output") else "snapshots, pictures, checkpoint and history of these short runs, which begin and end with them."), ""]
+        text.append(
+            f"| {r['point']} | {percent(1 - r['efficiency'])} | " + " | ".join(percent(r[f"lost {g}"]) for g in GROUPS) + f" | {named} |"
+        )
+    text += [
+        "",
+        "![losses](losses.svg)",
+        "",
+        "kernel: pair loops and update on the mean rank. imbalance: what the slowest rank computes longer than the mean, taken out of the waits. halo: packing,",
+        "ghost plans and what remains of the wait for halo. I/O: "
+        + (
+            f"snapshot, picture and checkpoint once in {plan['steps_per_output']} steps, as in a long run, and history."
+            if plan.get("steps_per_output")
+            else "snapshots, pictures, checkpoint and history of these short runs, which begin and end with them."
+        ),
+        "",
+    ]
     hashes = {}
     for r in rows:
         hashes.setdefault((r["series"], r["soil"], r["steps"]), set()).add(r["hash"])
     equal = all(len(h) == 1 for h in hashes.values())
-    text.append("The same soil gave the same state_hash on every layout." if equal else f"**State hashes differ between layouts of the same soil: {hashes}**")
+    text.append(
+        "The same soil gave the same state_hash on every layout."
+        if equal
+        else f"**State hashes differ between layouts of the same soil: {hashes}**"
+    )
     with open(os.path.join(out, "report.md"), "w") as f:
         f.write("\n".join(text) + "\n")
     with open(os.path.join(out, "points.csv"), "w", newline="") as f:
@@ -405,7 +505,11 @@ def main():
         plan = read_plan(args.plan)
         profile = None
         if args.machine:
-            path = args.machine if "/" in args.machine or args.machine.endswith(".toml") else os.path.join(ROOT, "jobs/machines", args.machine + ".toml")
+            path = (
+                args.machine
+                if "/" in args.machine or args.machine.endswith(".toml")
+                else os.path.join(ROOT, "jobs/machines", args.machine + ".toml")
+            )
             try:
                 with open(path, "rb") as f:
                     profile = tomllib.load(f)
@@ -427,7 +531,11 @@ def main():
         if not rows:
             print(f"no point of {args.plan} has results yet")
             return 0
-        where = profile["title"] if profile else f"Host {os.uname().nodename}, {len(os.sched_getaffinity(0))} cores, {repeats} repeat{'s' if repeats > 1 else ''} in turn"
+        where = (
+            profile["title"]
+            if profile
+            else f"Host {os.uname().nodename}, {len(os.sched_getaffinity(0))} cores, {repeats} repeat{'s' if repeats > 1 else ''} in turn"
+        )
         draw(rows, out)
         equal = report(plan, rows, points, out, where)
         print(f"{len(rows)} of {len(points)} points: {os.path.join(out, 'report.md')}")

@@ -41,8 +41,11 @@ SCENES = [  # name, scene, settings
     ("quickstart, 20^3", "jobs/scenes/quickstart.toml", []),
     ("hirata_52, a tenth of it", "jobs/scenes/hirata_52.toml", ["time.end=0.1"]),
     ("hirata_52 mixed, a tenth", "jobs/scenes/hirata_52.toml", ["time.end=0.1", 'accuracy.precision="mixed"']),
-    ("20^3 cohesive, artificial stress", "jobs/scenes/quickstart.toml", ["time.end=0.3", "soil.sand.cohesion=2e3",
-                                                                         "effects.artificial_stress={ epsilon = 0.5, exponent = 2.55 }"]),
+    (
+        "20^3 cohesive, artificial stress",
+        "jobs/scenes/quickstart.toml",
+        ["time.end=0.3", "soil.sand.cohesion=2e3", "effects.artificial_stress={ epsilon = 0.5, exponent = 2.55 }"],
+    ),
     ("20^3, step follows, corrected", "jobs/scenes/quickstart.toml", ["time.end=0.3", "!time.step", 'accuracy.correction="gradient"']),
     ("plane column, 100 x 100", PLANE, []),
 ]
@@ -65,8 +68,11 @@ def main():
                 else:
                     sets += ["--set", s]
             open(work + "/scene.toml", "w").write(text)
-            r = subprocess.run([a.program, "run", work + "/scene.toml", "-o", work + "/out", "--quiet", "--threads", a.threads, *sets],
-                               capture_output=True, text=True)
+            r = subprocess.run(
+                [a.program, "run", work + "/scene.toml", "-o", work + "/out", "--quiet", "--threads", a.threads, *sets],
+                capture_output=True,
+                text=True,
+            )
             if r.returncode:
                 sys.exit(f"{name}: exit {r.returncode}: {r.stderr}")
             s = json.load(open(work + "/out/summary.json"))
@@ -78,4 +84,5 @@ def main():
     return 0 if median <= 0.2 else 1
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

@@ -9,17 +9,25 @@
     perf/scaling.py serial    time of each phase with 1 and 2 threads, and the serial share that they tell (needs a quiet machine)
     perf/scaling.py plot      docs/figures/scaling.svg and cut.svg from build/scaling/*.json
 Answers are Markdown; the numbers stay in build/scaling. The program is build/release/kuzure, or --program PATH."""
-import argparse, json, os, subprocess, sys, tempfile
+# Beyond 400 lines: one function a figure.
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
 
 here = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 kept = os.path.join(here, "build", "scaling")
 SCENES = os.path.join(here, "jobs", "scenes")
 PER_NODE = 52**3
+args = None  # of the command line
 
 
 def scale(scene, ranks, *extra):
-    done = subprocess.run([args.program, "scale", scene, "--ranks", ",".join(map(str, ranks)), "--json", *extra],
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [args.program, "scale", scene, "--ranks", ",".join(map(str, ranks)), "--json", *extra], capture_output=True, text=True
+    )
     if done.returncode != 0:
         sys.exit(done.stderr)
     return json.loads(done.stdout)
@@ -55,19 +63,52 @@ def weak():
     for per_node in (1, 4, 32):
         out, base = [], None
         for edge, nodes in ((52, 1), (104, 8), (208, 64)):
-            case = scale(os.path.join(SCENES, f"hirata_{edge}.toml"), [nodes * per_node], "--machine", args.machine,
-                         "--ranks-per-node", str(per_node))[0]
+            case = scale(
+                os.path.join(SCENES, f"hirata_{edge}.toml"),
+                [nodes * per_node],
+                "--machine",
+                args.machine,
+                "--ranks-per-node",
+                str(per_node),
+            )[0]
             base = base or (case, edge**3)
             efficiency, lost = against(*base, case, edge**3)
             rows.append({"per_node": per_node, "nodes": nodes, "efficiency": efficiency, "lost": lost, **case})
             worse = case["predicted_seconds_per_step_if"]
             t = case["predicted_seconds_per_step"]
-            out.append([str(nodes), str(case["ranks"]), f"{case['pair_balance']:.3f}", f"{case['ghost_share']:.3f}", f"{1e3 * t:.2f}",
-                        f"**{efficiency:.3f}**", *[f"{100 * lost[k]:.1f}" for k in lost],
-                        f"{efficiency * t / worse['latency_doubled']:.3f}", f"{efficiency * t / worse['bandwidth_halved']:.3f}"])
+            out.append(
+                [
+                    str(nodes),
+                    str(case["ranks"]),
+                    f"{case['pair_balance']:.3f}",
+                    f"{case['ghost_share']:.3f}",
+                    f"{1e3 * t:.2f}",
+                    f"**{efficiency:.3f}**",
+                    *[f"{100 * lost[k]:.1f}" for k in lost],
+                    f"{efficiency * t / worse['latency_doubled']:.3f}",
+                    f"{efficiency * t / worse['bandwidth_halved']:.3f}",
+                ]
+            )
         print(f"{per_node} rank{'s' * (per_node > 1)} a node, {args.machine}")
-        table(["nodes", "ranks", "pairs max/mean", "ghosts per soil", "step, ms", "weak efficiency", "more pairs, %", "imbalance, %", "halo, %",
-               "reduction, %", "rebuild, %", "re-cut, %", "latency x 2", "bandwidth / 2"], out)
+        table(
+            [
+                "nodes",
+                "ranks",
+                "pairs max/mean",
+                "ghosts per soil",
+                "step, ms",
+                "weak efficiency",
+                "more pairs, %",
+                "imbalance, %",
+                "halo, %",
+                "reduction, %",
+                "rebuild, %",
+                "re-cut, %",
+                "latency x 2",
+                "bandwidth / 2",
+            ],
+            out,
+        )
     keep("weak", rows)
 
 
@@ -76,8 +117,10 @@ def tiled(nx, ny, folder):
     with open(os.path.join(SCENES, "hirata_52.toml")) as f:
         text = f.read()
     x, y = 3.28 + 2.08 * nx, 3.28 + 2.08 * ny
-    for old, new in (("high = [5.36, 5.36, 2.08]", f"high = [{x:.2f}, {y:.2f}, 2.08]"),
-                     ("high = [8.64, 8.64, 0.0]", f"high = [{x + 3.28:.2f}, {y + 3.28:.2f}, 0.0]")):
+    for old, new in (
+        ("high = [5.36, 5.36, 2.08]", f"high = [{x:.2f}, {y:.2f}, 2.08]"),
+        ("high = [8.64, 8.64, 0.0]", f"high = [{x + 3.28:.2f}, {y + 3.28:.2f}, 0.0]"),
+    ):
         assert old in text
         text = text.replace(old, new)
     name = os.path.join(folder, f"tiled_{nx}x{ny}.toml")
@@ -99,13 +142,47 @@ def series():
             rows.append({"nodes": nodes, "efficiency": efficiency, "lost": lost, **case})
             keep("series", rows)
             t, worse = case["predicted_seconds_per_step"], case["predicted_seconds_per_step_if"]
-            out.append([f"{nodes:,}", f"{case['ranks']:,}", f"{nodes * PER_NODE / 1e6:,.1f}", f"{case['pair_balance']:.3f}",
-                        f"{case['ghost_share']:.3f}", f"{1e3 * t:.2f}", f"**{efficiency:.3f}**", *[f"{100 * lost[k]:.1f}" for k in lost],
-                        f"{efficiency * t / worse['latency_doubled']:.3f}", f"{efficiency * t / worse['bandwidth_halved']:.3f}",
-                        f"{case['blocks']:,}", f"{case['cut_seconds']:.2f}", f"{case['peak_memory_bytes_here'] / 1e6:,.0f}"])
+            out.append(
+                [
+                    f"{nodes:,}",
+                    f"{case['ranks']:,}",
+                    f"{nodes * PER_NODE / 1e6:,.1f}",
+                    f"{case['pair_balance']:.3f}",
+                    f"{case['ghost_share']:.3f}",
+                    f"{1e3 * t:.2f}",
+                    f"**{efficiency:.3f}**",
+                    *[f"{100 * lost[k]:.1f}" for k in lost],
+                    f"{efficiency * t / worse['latency_doubled']:.3f}",
+                    f"{efficiency * t / worse['bandwidth_halved']:.3f}",
+                    f"{case['blocks']:,}",
+                    f"{case['cut_seconds']:.2f}",
+                    f"{case['peak_memory_bytes_here'] / 1e6:,.0f}",
+                ]
+            )
             print(f"{nodes} nodes: efficiency {efficiency:.3f}, cut {case['cut_seconds']:.2f} s", file=sys.stderr, flush=True)
-    table(["nodes", "ranks", "soil, millions", "pairs max/mean", "ghosts per soil", "step, ms", "weak efficiency", "more pairs, %", "imbalance, %",
-           "halo, %", "reduction, %", "rebuild, %", "re-cut, %", "latency x 2", "bandwidth / 2", "blocks", "cut here, s", "memory here, MB"], out)
+    table(
+        [
+            "nodes",
+            "ranks",
+            "soil, millions",
+            "pairs max/mean",
+            "ghosts per soil",
+            "step, ms",
+            "weak efficiency",
+            "more pairs, %",
+            "imbalance, %",
+            "halo, %",
+            "reduction, %",
+            "rebuild, %",
+            "re-cut, %",
+            "latency x 2",
+            "bandwidth / 2",
+            "blocks",
+            "cut here, s",
+            "memory here, MB",
+        ],
+        out,
+    )
 
 
 def balance():
@@ -117,32 +194,86 @@ def balance():
         scene = os.path.join(args.state, "scene.toml") if args.state else os.path.join(SCENES, name + ".toml")
         for case in scale(scene, ranks, *(["--from", args.state] if args.state else [])):
             rows.append({"scene": name, **case})
-            out.append([name, str(case["ranks"]), f"{case['largest_rank']['soil']:,}", f"{case['pair_balance']:.3f}", f"{case['ghost_share']:.3f}",
-                        f"{case['messages_per_step'] / case['ranks']:.1f}", str(case["scattered_ranks"]), f"{case['cut_seconds']:.2f}"])
+            out.append(
+                [
+                    name,
+                    str(case["ranks"]),
+                    f"{case['largest_rank']['soil']:,}",
+                    f"{case['pair_balance']:.3f}",
+                    f"{case['ghost_share']:.3f}",
+                    f"{case['messages_per_step'] / case['ranks']:.1f}",
+                    str(case["scattered_ranks"]),
+                    f"{case['cut_seconds']:.2f}",
+                ]
+            )
     keep("balance", rows)
     table(["scene", "ranks", "soil, most", "pairs max/mean", "ghosts per soil", "messages a rank", "scattered", "cut here, s"], out)
 
 
 def drift():
     scene = os.path.join(args.state, "scene.toml")
-    done = subprocess.run([args.program, "scale", scene, "--ranks", str(args.ranks), "--from", args.state, "--recuts", str(args.steps)],
-                          check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        [args.program, "scale", scene, "--ranks", str(args.ranks), "--from", args.state, "--recuts", str(args.steps)],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     cuts = json.loads(done.stdout)[0]["cuts"]
     keep("drift", cuts)
     every = max(1, len(cuts) // 10)
-    table(["cut", "max/mean before", "after", "blocks moved, %", "sweeps", "rounds", "scattered", "peers", "halo of it, MB", "busy, ms", "blocks known"],
-          [[str(k), f"{c['before']:.3f}", f"{c['after']:.3f}", f"{100 * c['moved_blocks'] / c['blocks']:.1f}", str(c["sweeps"]), str(c["rounds"]),
-            str(c["scattered"]), f"{c['peers_mean']:.1f}", f"{1e-6 * c['cut_bytes']:.1f}", f"{1e3 * c['busy_seconds']:.1f}", str(c["known_most"])]
-           for k, c in enumerate(cuts, 1) if k % every == 0])
+    table(
+        [
+            "cut",
+            "max/mean before",
+            "after",
+            "blocks moved, %",
+            "sweeps",
+            "rounds",
+            "scattered",
+            "peers",
+            "halo of it, MB",
+            "busy, ms",
+            "blocks known",
+        ],
+        [
+            [
+                str(k),
+                f"{c['before']:.3f}",
+                f"{c['after']:.3f}",
+                f"{100 * c['moved_blocks'] / c['blocks']:.1f}",
+                str(c["sweeps"]),
+                str(c["rounds"]),
+                str(c["scattered"]),
+                f"{c['peers_mean']:.1f}",
+                f"{1e-6 * c['cut_bytes']:.1f}",
+                f"{1e3 * c['busy_seconds']:.1f}",
+                str(c["known_most"]),
+            ]
+            for k, c in enumerate(cuts, 1)
+            if k % every == 0
+        ],
+    )
     last = cuts[-1]["whole"]
-    print(f"METIS at the end: {last['balance']:.3f}, {1e-6 * last['cut_bytes']:.1f} MB, {last['scattered']} scattered, {last['seconds']:.2f} s")
+    print(
+        f"METIS at the end: {last['balance']:.3f}, {1e-6 * last['cut_bytes']:.1f} MB, {last['scattered']} scattered, {last['seconds']:.2f} s"
+    )
 
 
 def timed(ranks, threads, steps):
     """timers.json of a short run of hirata_52."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [args.program, "run", os.path.join(SCENES, "hirata_52.toml"), "-o", os.path.join(folder, "out"), "--quiet", "--threads",
-                   str(threads), "--set", f"time.end={steps * 1e-4:.6f}"]
+        command = [
+            args.program,
+            "run",
+            os.path.join(SCENES, "hirata_52.toml"),
+            "-o",
+            os.path.join(folder, "out"),
+            "--quiet",
+            "--threads",
+            str(threads),
+            "--set",
+            f"time.end={steps * 1e-4:.6f}",
+        ]
         if ranks > 1:
             command = ["mpirun", "-n", str(ranks)] + command
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -172,8 +303,16 @@ def model():
         case = scale(os.path.join(SCENES, "hirata_52.toml"), [ranks], "--machine", "here", "--threads", str(threads))[0]
         did, said = median(found[ranks, threads]), case["predicted_seconds_per_step"]
         rows.append({"ranks": ranks, "threads": threads, "measured": found[ranks, threads], "predicted": said})
-        out.append([str(ranks), str(threads), f"{1e3 * did:.1f}", f"{1e3 * min(found[ranks, threads]):.1f} .. {1e3 * max(found[ranks, threads]):.1f}",
-                    f"{1e3 * said:.1f}", f"{100 * (said / did - 1):+.0f} %"])
+        out.append(
+            [
+                str(ranks),
+                str(threads),
+                f"{1e3 * did:.1f}",
+                f"{1e3 * min(found[ranks, threads]):.1f} .. {1e3 * max(found[ranks, threads]):.1f}",
+                f"{1e3 * said:.1f}",
+                f"{100 * (said / did - 1):+.0f} %",
+            ]
+        )
     keep("model", rows)
     table(["ranks", "threads", "measured, ms a step", "range", "predicted", "error"], out)
 
@@ -234,8 +373,11 @@ def work():
         for _ in range(args.repeats):  # in turn
             for name in shapes:
                 out = os.path.join(folder, "out")
-                subprocess.run([args.program, "run", os.path.join(folder, name + ".toml"), "-o", out, "--quiet", "--force", "--threads", "1"],
-                               check=True, stdout=subprocess.DEVNULL)
+                subprocess.run(
+                    [args.program, "run", os.path.join(folder, name + ".toml"), "-o", out, "--quiet", "--force", "--threads", "1"],
+                    check=True,
+                    stdout=subprocess.DEVNULL,
+                )
                 with open(os.path.join(out, "timers.json")) as f:
                     times[name].append(seconds(json.load(f)))
     t = {k: median(v) for k, v in times.items()}
@@ -243,8 +385,10 @@ def work():
     pair = (t["cube"] * n2 - t["sheet"] * n1) / (p1 * n2 - p2 * n1)
     particle = (t["cube"] - pair * p1) / n1
     wall = (t["sheet on a floor"] - t["sheet"]) / w3
-    table(["shape", "soil pairs", "wall pairs", "particles", "ms a step"],
-          [[k, *(f"{c:,}" for c in counts[k]), f"{1e3 * t[k]:.2f}"] for k in shapes])
+    table(
+        ["shape", "soil pairs", "wall pairs", "particles", "ms a step"],
+        [[k, *(f"{c:,}" for c in counts[k]), f"{1e3 * t[k]:.2f}"] for k in shapes],
+    )
     print(f"a soil pair {1e9 * pair:.2f} ns; a wall pair {wall / pair:.2f} and a particle {particle / pair:.1f} of it")
 
 
@@ -252,12 +396,31 @@ def plot():
     script = 'set term svg size 900,380 font "sans,12" background "white"\nset grid\nset key left bottom\n'
     with open(os.path.join(kept, "series.json")) as f:
         rows = json.load(f)
-    data = "$s << E\n" + "\n".join(" ".join(map(str, (
-        r["nodes"], r["efficiency"], r["efficiency"] * r["predicted_seconds_per_step"] / r["predicted_seconds_per_step_if"]["latency_doubled"],
-        r["efficiency"] * r["predicted_seconds_per_step"] / r["predicted_seconds_per_step_if"]["bandwidth_halved"],
-        r["ranks"], r["cut_seconds"], r["peak_memory_bytes_here"] / 1e9))) for r in rows) + "\nE\n"
+    data = (
+        "$s << E\n"
+        + "\n".join(
+            " ".join(
+                map(
+                    str,
+                    (
+                        r["nodes"],
+                        r["efficiency"],
+                        r["efficiency"] * r["predicted_seconds_per_step"] / r["predicted_seconds_per_step_if"]["latency_doubled"],
+                        r["efficiency"] * r["predicted_seconds_per_step"] / r["predicted_seconds_per_step_if"]["bandwidth_halved"],
+                        r["ranks"],
+                        r["cut_seconds"],
+                        r["peak_memory_bytes_here"] / 1e9,
+                    ),
+                )
+            )
+            for r in rows
+        )
+        + "\nE\n"
+    )
     figures = os.path.join(here, "docs", "figures")
-    script += data + f'''set logscale x
+    script += (
+        data
+        + f"""set logscale x
 set output "{figures}/scaling.svg"
 set title "self-similar series, 140,608 soil particles and 4 ranks a node, {args.machine} (predicted)"
 set xlabel "nodes"; set ylabel "weak efficiency per soil particle"; set yrange [0:1.05]
@@ -266,19 +429,26 @@ plot $s u 1:2 w lp lw 2 pt 7 t "model", "" u 1:3 w lp dt 2 t "latency x 2", "" u
 set output "{figures}/cut.svg"
 set title "the serial cut: METIS on one core of this machine"; set xlabel "ranks"; set ylabel "s, GB"; set yrange [*:*]; set logscale y; set key left top
 plot $s u 5:6 w lp lw 2 pt 7 t "seconds", "" u 5:7 w lp lw 2 pt 5 t "GB, of the whole program"
-'''
+"""
+    )
     subprocess.run(["gnuplot"], input=script, text=True, check=True)
     print(f"{figures}/scaling.svg {figures}/cut.svg")
 
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("figure", choices=("weak", "series", "balance", "drift", "model", "work", "serial", "plot"))
-parser.add_argument("--program", default=os.path.join(here, "build", "release", "kuzure"))
-parser.add_argument("--machine", default="oakforest-pacs")
-parser.add_argument("--nodes", type=int, default=8208, help="largest of the series")
-parser.add_argument("--from", dest="state", help="result directory of hirata_52")
-parser.add_argument("--steps", type=int, default=200)
-parser.add_argument("--ranks", type=int, default=64, help="of drift")
-parser.add_argument("--repeats", type=int, default=5)
-args = parser.parse_args()
-globals()[args.figure]()
+def main():
+    global args
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("figure", choices=("weak", "series", "balance", "drift", "model", "work", "serial", "plot"))
+    parser.add_argument("--program", default=os.path.join(here, "build", "release", "kuzure"))
+    parser.add_argument("--machine", default="oakforest-pacs")
+    parser.add_argument("--nodes", type=int, default=8208, help="largest of the series")
+    parser.add_argument("--from", dest="state", help="result directory of hirata_52")
+    parser.add_argument("--steps", type=int, default=200)
+    parser.add_argument("--ranks", type=int, default=64, help="of drift")
+    parser.add_argument("--repeats", type=int, default=5)
+    args = parser.parse_args()
+    globals()[args.figure]()
+
+
+if __name__ == "__main__":
+    main()

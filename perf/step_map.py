@@ -141,7 +141,9 @@ def on_floor_periodic(surface='"rough"', deep=0.0):
 
 def impact():
     thrown = f"velocity = [0.0, 0.0, {-0.3 * p_wave(YOUNG)}]"
-    return dict(end=0.06, bodies=[box((0.0, 0.0, 0.0), (0.4, 0.0, 0.12)), box((0.08, 0.0, 0.16), (0.32, 0.0, 0.4), thrown)], walls=on_floor())
+    return dict(
+        end=0.06, bodies=[box((0.0, 0.0, 0.0), (0.4, 0.0, 0.12)), box((0.08, 0.0, 0.16), (0.32, 0.0, 0.4), thrown)], walls=on_floor()
+    )
 
 
 PLAIN = dict(kernels=KERNELS, alphas=ALPHAS)
@@ -162,9 +164,7 @@ CASES = {
     "corner, smooth": Case(0.5, BLOCK, corner(SMOOTH)),
     "corner, Coulomb": Case(0.5, BLOCK, corner(COULOMB)),
     "over an edge": Case(
-        0.5,
-        [box((0.0, 0.0, 0.0), (0.4, 0.0, 0.6))],
-        [box((-0.6, 0.0, -0.6), (0.4, 0.0, 0.0)), box((0.4, 0.0, -0.6), (2.0, 0.0, -0.4))],
+        0.5, [box((0.0, 0.0, 0.0), (0.4, 0.0, 0.6))], [box((-0.6, 0.0, -0.6), (0.4, 0.0, 0.0)), box((0.4, 0.0, -0.6), (2.0, 0.0, -0.4))]
     ),
     "column, stiff below soft (10)": Case(0.3, **layers(10 * YOUNG, YOUNG, SAND), space=PERIODIC),
     "column, soft below stiff (10)": Case(0.3, **layers(YOUNG, 10 * YOUNG, SAND), space=PERIODIC),
@@ -175,7 +175,9 @@ CASES = {
     "column, stress diffusion 1": Case(0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, effects="stress_diffusion = { zeta = 1.0 }"),
     "collapse, stress diffusion 0.1": Case(0.5, BLOCK, on_floor(), effects="stress_diffusion = { zeta = 0.1 }"),
     "bar, gradient correction": Case(0.3, THROWN, on_floor_periodic(), **BAR, accuracy='correction = "gradient"', most=CORRECTED),
-    "column, gradient correction": Case(0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, accuracy='correction = "gradient"', most=CORRECTED),
+    "column, gradient correction": Case(
+        0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, accuracy='correction = "gradient"', most=CORRECTED
+    ),
     "collapse, gradient correction": Case(0.5, BLOCK, on_floor(), accuracy='correction = "gradient"', most=CORRECTED),
     "collapse, mixed precision": Case(0.5, BLOCK, on_floor(), accuracy='precision = "mixed"'),
     "bar, 3-D": Case(
@@ -294,9 +296,13 @@ def figure(rows, directory, results):
             lines.append(f"'' index {index} using 1:3 with linespoints pt 6 ps 0.8 lw 1 {colour} notitle")
             lines.append(f"'' index {index} using 1:4 with lines dt 3 lw 1 {colour} notitle")
         key = "set key bottom right font ',8'" if i == 0 else "unset key"
-        script.append(f"set size 0.333,0.36\nset origin {i / 3},0.64\n{key}\nset title '{name}: filled stable, open accurate, dotted refused above'")
+        script.append(
+            f"set size 0.333,0.36\nset origin {i / 3},0.64\n{key}\nset title '{name}: filled stable, open accurate, dotted refused above'"
+        )
         script.append(f"plot {', '.join(lines)}, 1 dt 2 lc 'black' notitle")
-    script.append(f"set yrange [0.3:{len(places) + 0.7}]\nset xrange [0:2.6]\nset xlabel 'dt c_p/h'\nunset ylabel\nset key bottom left font ',8'")
+    script.append(
+        f"set yrange [0.3:{len(places) + 0.7}]\nset xrange [0:2.6]\nset xlabel 'dt c_p/h'\nunset ylabel\nset key bottom left font ',8'"
+    )
     for i, alpha in enumerate((0.1, 1.0)):
         index = 3 * len(KERNELS) + i
         left, width = (0.0, 0.6) if i == 0 else (0.6, 0.4)
@@ -327,7 +333,9 @@ def table(rows):
         cells.setdefault((r["case"], r["kernel"], r["h"]), {})[r["alpha"]] = f"{stable} / {accurate} ({refused:.2f})"
     alphas = [a for a in ALPHAS if any(a in cell for cell in cells.values())]
     lines = ["| case | kernel, h | " + " | ".join(f"alpha {a:g}" for a in alphas) + " |", "|" + "---|" * (2 + len(alphas))]
-    lines += [f"| {case} | {kernel}, {h} | " + " | ".join(cell.get(a, "") for a in alphas) + " |" for (case, kernel, h), cell in cells.items()]
+    lines += [
+        f"| {case} | {kernel}, {h} | " + " | ".join(cell.get(a, "") for a in alphas) + " |" for (case, kernel, h), cell in cells.items()
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -1,9 +1,14 @@
-"""What the Python tests share: the program under test, checks that are counted, the end. Nothing here is a test.
+"""What the Python tests share: the program under test, a directory of one's own, scenes, checks that are counted, the end.
+Nothing here is a test.
 
-A test in a folder below puts this one on its path: sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+A test in a folder below puts this one on its path:
+    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 """
+import atexit
 import os
+import shutil
 import sys
+import tempfile
 
 program = os.path.abspath(sys.argv[1])
 root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -18,7 +23,60 @@ def check(good, what):
     return good
 
 
-def finish():
-    """How many checks failed, and the exit code of the test."""
+def need(good, fault):
+    """As check(), for many things at once: says nothing but the fault, where there is one."""
+    return good or check(False, fault)
+
+
+def finish(code=0):
+    """How many checks failed, and the exit code of the test: 1, or `code` where none did."""
     print(f"{len(failures)} failures")
-    sys.exit(1 if failures else 0)
+    sys.exit(1 if failures else code)
+
+
+def scratch(name):
+    """A directory for this test, which goes when the test ends."""
+    directory = tempfile.mkdtemp(prefix=f"kuzure-{name}-")
+    atexit.register(shutil.rmtree, directory, ignore_errors=True)
+    return directory
+
+
+def vector(v):
+    return f"[{', '.join(str(float(x)) for x in v)}]"
+
+
+def block(
+    high=(0.32, 0.32, 0.32),
+    floor=((-0.4, -0.4, -0.16), (0.72, 0.72, 0.0)),
+    low=(0, 0, 0),
+    title="a block",
+    name="sand",
+    young="1.8e6",
+    spacing=0.04,
+    h=1.2,
+    end=0.004,
+    step=1.0e-4,
+    space="",
+    soil="",
+    body="",
+    wall="",
+    effects="",
+    accuracy="",
+    output="",
+):
+    """The scene most tests start from, as text: a block of soil on a floor (or on none), flat where it has no width.
+
+    What is `space` ... `output` are lines more of these sections; h or step None leaves them to kuzure.
+    """
+    sections = [
+        (f'title = "{title}"', f"dimensions = {3 if high[1] > low[1] else 2}"),
+        ("[space]", f"spacing = {spacing}", f"h = {h}" if h else "", space),
+        ("[time]", f"end = {end}", f"step = {step}" if step else ""),
+        (f"[soil.{name}]", "density = 1850.0", f"young = {young}", "poisson = 0.3", "friction_angle = 25.0", soil),
+        ("[[body]]", f'soil = "{name}"', f"box = {{ low = {vector(low)}, high = {vector(high)} }}", body),
+        ("[[wall]]", f"box = {{ low = {vector(floor[0])}, high = {vector(floor[1])} }}", wall) if floor else (),
+        ("[effects]", "gravity = [0.0, 0.0, -9.81]", effects),
+        ("[accuracy]", accuracy) if accuracy else (),
+        ("[output]", output) if output else (),
+    ]
+    return "\n".join(line for section in sections for line in section if line) + "\n"

@@ -31,7 +31,7 @@ class Screen:
             elif token == "\n":
                 self.lines.append("")
             elif token == "\x1b[K":
-                self.lines[-1] = self.lines[-1][:self.x]
+                self.lines[-1] = self.lines[-1][: self.x]
             elif token.startswith("\x1b"):
                 raise SystemExit(f"a control sequence that this screen does not know: {token!r}")
             else:
@@ -39,7 +39,7 @@ class Screen:
                     self.lines.append("")
                     self.x = 0
                 line = self.lines[-1].ljust(self.x)
-                self.lines[-1] = line[:self.x] + token + line[self.x + 1:]
+                self.lines[-1] = line[: self.x] + token + line[self.x + 1 :]
                 self.x += 1
 
 
@@ -64,14 +64,41 @@ def on_terminal(columns, command):
 
 
 def shoot(work, source, target, width, height, *more):
-    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={work}/chromium",
-                    f"--window-size={width},{height}", "--virtual-time-budget=4000", f"--screenshot={target}", *more, "file://" + source],
-                   check=True, capture_output=True, timeout=240)
+    subprocess.run(
+        [
+            "chromium",
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--hide-scrollbars",
+            f"--user-data-dir={work}/chromium",
+            f"--window-size={width},{height}",
+            "--virtual-time-budget=4000",
+            f"--screenshot={target}",
+            *more,
+            "file://" + source,
+        ],
+        check=True,
+        capture_output=True,
+        timeout=240,
+    )
     # Fewer colours: a third of the size, and no difference to the eye.
     if shutil.which("ffmpeg"):
         small = work + "/small.png"
-        subprocess.run(["ffmpeg", "-y", "-v", "error", "-i", target, "-vf", "split[a][b];[a]palettegen=max_colors=200[p];[b][p]paletteuse=dither=none",
-                        small], check=True)
+        subprocess.run(
+            [
+                "ffmpeg",
+                "-y",
+                "-v",
+                "error",
+                "-i",
+                target,
+                "-vf",
+                "split[a][b];[a]palettegen=max_colors=200[p];[b][p]paletteuse=dither=none",
+                small,
+            ],
+            check=True,
+        )
         if os.path.getsize(small) < os.path.getsize(target):
             shutil.move(small, target)
     print(f"{target}: {os.path.getsize(target) // 1000} kB")
@@ -82,9 +109,11 @@ def draw(work, name, parts, columns):
     body = "".join(f"<p>{html.escape(title)}</p><pre>{html.escape(chr(10).join(lines))}</pre>" for title, lines in parts)
     rows = sum(len(lines) for _, lines in parts)
     with open(f"{work}/{name}.html", "w") as f:
-        f.write("<!doctype html><meta charset=utf-8><style>body{margin:0;padding:12px;background:#fff;font:13px/1.4 'DejaVu Sans',sans-serif;color:#444}"
-                "p{margin:0 0 4px}pre{font:14px/19px 'DejaVu Sans Mono',monospace;background:#16191d;color:#dfe4ea;padding:10px 12px;margin:0 0 12px;"
-                f"border-radius:6px;width:{columns}ch;white-space:pre}}</style>" + body)
+        f.write(
+            "<!doctype html><meta charset=utf-8><style>body{margin:0;padding:12px;background:#fff;font:13px/1.4 'DejaVu Sans',sans-serif;color:#444}"
+            "p{margin:0 0 4px}pre{font:14px/19px 'DejaVu Sans Mono',monospace;background:#16191d;color:#dfe4ea;padding:10px 12px;margin:0 0 12px;"
+            f"border-radius:6px;width:{columns}ch;white-space:pre}}</style>" + body
+        )
     shoot(work, f"{work}/{name}.html", f"{HERE}/{name}.png", int(columns * 8.43) + 52, rows * 19 + len(parts) * 58 + 14)
 
 
@@ -108,8 +137,12 @@ def main():
             if k == shown[len(shown) // 2]:
                 during = list(screen.lines)
         prompt = "$ kuzure run jobs/scenes/quickstart.toml"
-        draw(work, f"terminal_{columns}", [(f"{columns} columns, during the run", [prompt, *during]),
-                                           ("at the end", [prompt, *screen.lines])], columns)
+        draw(
+            work,
+            f"terminal_{columns}",
+            [(f"{columns} columns, during the run", [prompt, *during]), ("at the end", [prompt, *screen.lines])],
+            columns,
+        )
     report = results + "/report.html"
     shoot(work, report, HERE + "/report_light.png", 1280, 1500)
     shoot(work, report, HERE + "/report_dark.png", 1280, 1500, "--blink-settings=preferredColorScheme=0")

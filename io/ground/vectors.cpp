@@ -79,7 +79,7 @@ scene::Ring checked_ring(scene::Ring ring, const Path& path, std::size_t feature
                                           ring.front()[1], ring.back()[0], ring.back()[1], mend));
     ring.pop_back();
     ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
-    if (ring.size() < 3 || signed_area(ring) == 0) refuse(path, feature, fmt::format("a ring that encloses nothing. {}", mend));
+    if (ring.size() < 3) refuse(path, feature, fmt::format("a ring that encloses nothing. {}", mend));
     return ring;
 }
 
@@ -124,6 +124,9 @@ void check_outlines(const Outlines& o, const Path& path)
                                  "it overlaps feature {} at ({:.10g}, {:.10g}). Remedy: unite them (QGIS: Vector > Dissolve), or cut one",
                                  other + 1, (*at)[0], (*at)[1]));
             }
+    for (std::size_t k = 0; k < o.features.size(); ++k)
+        for (const auto& ring : o.features[k].rings)
+            if (signed_area(ring) == 0) refuse(path, k, fmt::format("a ring that encloses nothing. {}", mend));
     for (std::size_t i = 0; i < o.features.size(); ++i)
         for (std::size_t k = 0; k < o.features.size(); ++k)
             if (i != k)

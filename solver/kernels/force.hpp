@@ -261,7 +261,11 @@ private:
             const double held_by = s * at(w.limit, k), area = s * at(w.area, k);
             // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
             const bool faces = area != 0, approached = s * at(w.approach, k) > 0, pressed = held_by > 0;
-            if (!faces || !(pressed || approached)) {
+            // What the strain of this step counted, the force counts too: soil that a step pulls off the wall is pulled back once, else
+            // the wall would have stretched it for nothing. Friction carries a share of all that presses, the viscous push too.
+            const double viscous = std::as_const(p)[field::wall_pressure][i];
+            const bool counted = viscous >= 0;
+            if (!faces || !(pressed || approached || counted)) {
                 slip.set(i, Vector{}), pressure.set(i, 0.0);
                 continue;
             }
@@ -269,8 +273,8 @@ private:
             const Vector normal = size > 0 ? (1 / size) * push : Vector{};
             const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
             // a spring of the soil's own shear stiffness across half a smoothing length
-            const double stiffness = pressed ? m.shear * std::fabs(area) / (0.5 * h_) : 0;
-            const auto f = return_to_coulomb(slip[i], in.dt * v[i], normal, pressed ? size : 0, held_by, stiffness);
+            const double limit = held_by + std::max(viscous, 0.0), stiffness = m.shear * std::fabs(area) / (0.5 * h_);
+            const auto f = return_to_coulomb(slip[i], in.dt * v[i], normal, limit, stiffness);
             slip.set(i, f.slip), pressure.set(i, pressed ? size : 0.0);
             out[0][k] = push.x + f.force.x, out[1][k] = push.y + f.force.y, out[2][k] = push.z + f.force.z;
         }

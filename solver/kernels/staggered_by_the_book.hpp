@@ -187,6 +187,9 @@ struct Kept {
     Vector slip{};
     double pressed = 0;
     double plastic_strain = 0, opened = 0;
+    // What the strain of the step says to its force: whether Coulomb faces counted, and how much friction the viscous push allows, N/m^3.
+    bool counted = false;
+    double rubbing = 0;
 };
 constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
 
@@ -195,6 +198,8 @@ struct Strain {
     Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
     Vector viscous{};      // acceleration, m/s^2
     bool beside_wall = false;
+    bool counted = false; // Coulomb faces do
+    double rubbing = 0;   // friction that the viscous push allows, N/m^3
 };
 inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
 {
@@ -232,9 +237,13 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         shown.x = w.x;
         const double Pi = viscosity(*viscous, s.how.h, here, shown, mirrored);
         pressure = pressure + (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
+        if (wall.surface == scene::Surface::Coulomb)
+            of_i.rubbing -= std::tan(wall.friction_angle) * i.volume * i.density * i.density * Pi * dot(grad, face.normal);
     }
+    of_i.rubbing = std::max(of_i.rubbing, 0.0);
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
-    if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
+    of_i.counted = kept.pressed > 0 || trace(sliding) < 0;
+    if (of_i.counted) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
@@ -285,7 +294,7 @@ struct Forced {
     double pressed = 0;
     Taken before, coming; // in the half step before and in the one to come
     std::int64_t pairs = 0;
-    enum class Contact { None, Sticks, Slides, Approached, LetGo } contact = Contact::None; // with Coulomb faces
+    enum class Contact { None, Sticks, Slides, Approached, PulledOff, LetGo } contact = Contact::None; // with Coulomb faces
 };
 /// `kept.acceleration` is the viscous one of this step; dt is its length, `next` that of the one to come, s.
 inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt,
@@ -327,18 +336,28 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         area -= facing, approach += facing * dot(i.v, face.normal);
     }
     Vector by_walls = (1 / i.density) * held;
-    // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
-    // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
+    // Coulomb: the wall is felt where it presses, where the particle comes nearer, or where the strain felt it. Friction is a spring of the
+    // soil's shear stiffness across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (area != 0) {
-        of_i.contact = limit > 0 ? Forced::Contact::Sticks : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
-        if (limit > 0) {
-            const double size = length(push), stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
-            const Vector n = (1 / size) * push;
+        of_i.contact = limit > 0      ? Forced::Contact::Sticks
+                       : approach > 0 ? Forced::Contact::Approached
+                       : kept.counted ? Forced::Contact::PulledOff
+                                      : Forced::Contact::LetGo;
+        if (limit > 0) of_i.pressed = length(push) / i.density;
+        limit += kept.counted ? kept.rubbing : 0;
+        if (limit < 0 && of_i.contact != Forced::Contact::LetGo && length(kept.slip) > 0) { // pulled: friction is taken back too
+            const Vector n = (1 / length(push)) * push;
+            Vector slip = kept.slip + dt * i.v;
+            slip = slip - dot(slip, n) * n;
+            if (length(slip) > 0) push = push - (limit / length(slip)) * slip;
+        } else if (limit > 0 && of_i.contact != Forced::Contact::LetGo) {
+            const double stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
+            const Vector n = (1 / length(push)) * push;
             Vector slip = kept.slip + dt * i.v;
             slip = slip - dot(slip, n) * n;
             if (const double trial = stiffness * length(slip); trial > limit)
                 slip = (limit / trial) * slip, of_i.contact = Forced::Contact::Slides;
-            of_i.slip = slip, of_i.pressed = size / i.density;
+            of_i.slip = slip;
             push = push - stiffness * slip;
         }
         if (of_i.contact != Forced::Contact::LetGo) by_walls = by_walls + (1 / i.density) * push;

@@ -1,14 +1,21 @@
 #!/usr/bin/python3
 """INTERFACE of the program: exit codes, messages, files and what is in them."""
-import csv, glob, json, os, shutil, signal, subprocess, sys, tempfile, time
+import csv
+import glob
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import h5py
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, program, root
+from harness import block, check, finish, program, root, scratch
 
-work = tempfile.mkdtemp(prefix="kuzure-contract-")
+work = scratch("contract")
 
 
 def call(*args, expect=0, **kw):
@@ -17,44 +24,38 @@ def call(*args, expect=0, **kw):
     return done
 
 
-SMALL = """title = "small"
-dimensions = 3
-[space]
-spacing = 0.04
-h = 1.2
-[time]
-end = 0.004
-step = 1.0e-4
-[soil.sand]
-density = 1850.0
-young = 1.8e6
-poisson = 0.3
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = { low = [0.0, 0.0, 0.0], high = [0.32, 0.32, 0.32] }
-[[wall]]
-box = { low = [-0.4, -0.4, -0.16], high = [0.72, 0.72, 0.0] }
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = { alpha = 0.1, beta = 0.0 }
-[output]
-every = 0.002
-history = 0.0005
-picture = { view = "oblique", color = "displacement" }
-"""
-try:
+SMALL = block(
+    title="small",
+    effects="viscosity = { alpha = 0.1, beta = 0.0 }",
+    output='every = 0.002\nhistory = 0.0005\npicture = { view = "oblique", color = "displacement" }',
+)
+
+
+def main():
     scene = os.path.join(work, "small.toml")
     with open(scene, "w") as f:
         f.write(SMALL)
     # ---- check
     report = json.loads(call("check", scene, "--json").stdout)
-    for key in ("soil_particles", "wall_particles", "dt", "steps", "memory_bytes", "disk_bytes", "predicted_seconds", "effects", "warnings"):
+    for key in (
+        "soil_particles",
+        "wall_particles",
+        "dt",
+        "steps",
+        "memory_bytes",
+        "disk_bytes",
+        "predicted_seconds",
+        "effects",
+        "warnings",
+    ):
         check(key in report, f"check --json has {key}")
     check(report["soil_particles"] == 512 and report["wall_particles"] == 28 * 28 * 4, "check counts particles")
     check(report["steps"] == 40 and report["dt"] == 1e-4, "check counts steps")
     body, cones = report["bodies"][0], list(report["soils"].values())
-    check(body["particles"] == 512 and body["mass"] > 0 and abs(body["excess_of_mass"]) < 1e-9, f"check weighs a body against its shape's volume: {body}")
+    check(
+        body["particles"] == 512 and body["mass"] > 0 and abs(body["excess_of_mass"]) < 1e-9,
+        f"check weighs a body against its shape's volume: {body}",
+    )
     check(all(0 < c["rough_bed_angle"] < c["stress_circle_angle"] < 90 for c in cones), f"check says what a cone acts like: {cones}")
     text = call("check", scene).stdout
     check("the mass of its shape's volume" in text and "atan 3 alpha" in text, "check prints both")
@@ -72,13 +73,18 @@ try:
         check(sorted(data["id"]) == list(range(512 + 3136)), "ids are 0 .. n-1")
         kind = np.array(data["kind"])
         check(int((kind == 0).sum()) == 512 and int((kind == 1).sum()) == 3136, "kind tells soil from wall")
-        check(np.array_equal(np.array(walls["VTKHDF/Points"]), np.array(points)[kind == 1]) and set(np.array(walls["VTKHDF/PointData/kind"])) == {1},
-              "walls.hdf has the walls alone")
+        check(
+            np.array_equal(np.array(walls["VTKHDF/Points"]), np.array(points)[kind == 1])
+            and set(np.array(walls["VTKHDF/PointData/kind"])) == {1},
+            "walls.hdf has the walls alone",
+        )
     with h5py.File(snaps[-1]) as f:
         g = f["VTKHDF"]
         points, data = g["Points"], g["PointData"]
         check(points.shape == (512, 3) and points.dtype == np.float64, "later ones have soil only: walls do not move")
-        check(set(data) >= {"id", "kind", "soil", "velocity", "stress", "density", "plastic_strain", "displacement"}, "PointData is complete")
+        check(
+            set(data) >= {"id", "kind", "soil", "velocity", "stress", "density", "plastic_strain", "displacement"}, "PointData is complete"
+        )
         check(data["id"].dtype == np.int64 and sorted(data["id"]) == list(range(512)), "soil comes first in the ids")
         soil = np.array(data["kind"]) == 0
         stress = np.array(data["stress"])[soil]
@@ -97,8 +103,26 @@ try:
     first = dict(zip(rows[0], rows[2]))
     check(abs(float(first["height"]) - 0.32) < 1e-9 and abs(float(first["front_max_x"]) - 0.32) < 1e-9, "height and front at the start")
     summary = json.load(open(out + "/summary.json"))
-    for key in ("status", "exit_code", "scene_hash", "version", "ranks", "threads", "precision", "soil_particles", "wall_particles", "steps", "time",
-                "wall_seconds", "pairs", "seconds_per_step", "particle_steps_per_second", "energy", "effects", "state_hash"):
+    for key in (
+        "status",
+        "exit_code",
+        "scene_hash",
+        "version",
+        "ranks",
+        "threads",
+        "precision",
+        "soil_particles",
+        "wall_particles",
+        "steps",
+        "time",
+        "wall_seconds",
+        "pairs",
+        "seconds_per_step",
+        "particle_steps_per_second",
+        "energy",
+        "effects",
+        "state_hash",
+    ):
         check(key in summary, f"summary.json has {key}")
     check(summary["status"] == "finished" and summary["steps"] == 40 and summary["exit_code"] == 0, "summary.json tells the end")
     # ---- the written scene runs again to the same bits
@@ -124,8 +148,22 @@ try:
     blown = call("run", scene, "-o", "blown", "--quiet", "--force-step", "--set", "time.step=8e-3", "--set", "time.end=8.0", expect=3)
     check("particle" in blown.stderr and "Remedy" in blown.stderr, "a blow-up names the particle and the remedy")
     check(json.load(open(work + "/blown/summary.json"))["exit_code"] == 3, "summary.json tells the failure")
-    box = call("run", scene, "-o", "left", "--quiet", "--set", "space.low=[-0.1,-0.1,-0.1]", "--set", "space.high=[0.33,1,1]", "--set",
-               "body.0.velocity=[3,0,0]", "--set", "time.end=0.1", expect=3)
+    box = call(
+        "run",
+        scene,
+        "-o",
+        "left",
+        "--quiet",
+        "--set",
+        "space.low=[-0.1,-0.1,-0.1]",
+        "--set",
+        "space.high=[0.33,1,1]",
+        "--set",
+        "body.0.velocity=[3,0,0]",
+        "--set",
+        "time.end=0.1",
+        expect=3,
+    )
     check("left the box" in box.stderr, "a particle that leaves the box is named")
     # ---- stopping on request: exit 5, and on to the same bits
     process = subprocess.Popen([program, "run", scene, "-o", "stop", "--quiet", "--set", "time.end=3"], cwd=work)
@@ -158,10 +196,18 @@ try:
     check("another scene" in mixed.stderr, "a checkpoint does not go on among the results of another scene")
     check(all(open(name, "rb").read() == data for name, data in before.items()), "they stay as they were")
     # ---- words that cannot be written
-    for words in (("check", scene), ("check", scene, "--json"), ("job", scene, "--machine", "slurm", "--nodes", "1"), ("reference",), ("schema",)):
+    for words in (
+        ("check", scene),
+        ("check", scene, "--json"),
+        ("job", scene, "--machine", "slurm", "--nodes", "1"),
+        ("reference",),
+        ("schema",),
+    ):
         with open("/dev/full", "w") as full:
             done = subprocess.run([program, *words], cwd=work, stdout=full, stderr=subprocess.PIPE, text=True)
-        check(done.returncode == 4 and "defect" not in done.stderr, f"kuzure {words[0]} into a full disk is exit 4, found {done.returncode}")
+        check(
+            done.returncode == 4 and "defect" not in done.stderr, f"kuzure {words[0]} into a full disk is exit 4, found {done.returncode}"
+        )
     # ---- a damaged checkpoint
     path = work + "/straight/checkpoint.h5"
     data = bytearray(open(path, "rb").read())
@@ -182,6 +228,8 @@ try:
     call("run", work + "/silent.toml", "-o", "silent", "--quiet", "--set", "time.end=0.001")
     rows = [row.split(",")[0] for row in open(work + "/silent/history.csv") if row[0].isdigit()]
     check(rows == ["0", "0.001"], f"without output.history the first and the last row are written, found {rows}")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-finish()
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -7,9 +7,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-PROGRAM = Path(sys.argv[1]).resolve()
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from harness import finish, need, program
+
+PROGRAM = Path(program)
 BUILD = PROGRAM.parent
-FAILED = []
 
 CMAKE = """cmake_minimum_required(VERSION 3.22)
 project(consumer CXX)
@@ -49,65 +51,83 @@ int main()
 """
 
 
-def check(holds, what):
-    if not holds:
-        FAILED.append(what)
-
-
 def run(*command, cwd=None, expected=0):
     environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=600, env=environment)
-    check(done.returncode == expected, f"{' '.join(map(str, command))}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+    need(done.returncode == expected, f"{' '.join(map(str, command))}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
     return done.stdout
 
 
-with tempfile.TemporaryDirectory(prefix="kuzure-install-") as folder:
-    work = Path(folder)
-    prefix = work / "prefix"
-    run("cmake", "--install", BUILD, "--prefix", prefix)
-    program = prefix / "bin/kuzure"
-    for file in ("share/kuzure/scenes/quickstart.toml", "share/kuzure/machines/slurm.toml", "share/kuzure/machines/slurm.job.sh", "share/doc/kuzure/README.md",
-                 "share/doc/kuzure/docs/tutorial.md", "share/bash-completion/completions/kuzure", "share/zsh/site-functions/_kuzure",
-                 "share/fish/vendor_completions.d/kuzure.fish", "share/man/man1/kuzure.1"):
-        check((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")
-    check(run(program, "--version") == run(PROGRAM, "--version"), "--version of the installed program")
+def main():
+    with tempfile.TemporaryDirectory(prefix="kuzure-install-") as folder:
+        work = Path(folder)
+        prefix = work / "prefix"
+        run("cmake", "--install", BUILD, "--prefix", prefix)
+        program = prefix / "bin/kuzure"
+        for file in (
+            "share/kuzure/scenes/quickstart.toml",
+            "share/kuzure/machines/slurm.toml",
+            "share/kuzure/machines/slurm.job.sh",
+            "share/doc/kuzure/README.md",
+            "share/doc/kuzure/docs/tutorial.md",
+            "share/bash-completion/completions/kuzure",
+            "share/zsh/site-functions/_kuzure",
+            "share/fish/vendor_completions.d/kuzure.fish",
+            "share/man/man1/kuzure.1",
+        ):
+            need((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")
+        need(run(program, "--version") == run(PROGRAM, "--version"), "--version of the installed program")
 
-    # Its own profiles, not the sources': one that is only there is found.
-    profile = prefix / "share/kuzure/machines/slurm.toml"
-    (profile.parent / "elsewhere.toml").write_text(profile.read_text())
-    job = run(program, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
-    check(f"'{program}'" in job and job.startswith("#!/bin/bash"), "the batch script does not start the installed program")
+        # Its own profiles, not the sources': one that is only there is found.
+        profile = prefix / "share/kuzure/machines/slurm.toml"
+        (profile.parent / "elsewhere.toml").write_text(profile.read_text())
+        job = run(program, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
+        need(f"'{program}'" in job and job.startswith("#!/bin/bash"), "the batch script does not start the installed program")
 
-    # What a package has: the program under lib/kuzure, the launcher in bin. Scripts must start the launcher.
-    inner = prefix / "lib/kuzure/x86-64/kuzure"
-    inner.parent.mkdir(parents=True)
-    program.rename(inner)
-    program.write_text("stands for the launcher")
-    job = run(inner, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
-    check(f"'{program}'" in job, "the batch script of a packaged program does not start the launcher")
+        # What a package has: the program under lib/kuzure, the launcher in bin. Scripts must start the launcher.
+        inner = prefix / "lib/kuzure/x86-64/kuzure"
+        inner.parent.mkdir(parents=True)
+        program.rename(inner)
+        program.write_text("stands for the launcher")
+        job = run(inner, "job", prefix / "share/kuzure/scenes/quickstart.toml", "--machine", "elsewhere", "--nodes", "1", cwd=work)
+        need(f"'{program}'" in job, "the batch script of a packaged program does not start the launcher")
 
-    source = work / "consumer"
-    source.mkdir()
-    (source / "CMakeLists.txt").write_text(CMAKE)
-    (source / "main.cpp").write_text(SOLVER)
-    (source / "scene.cpp").write_text(SCENE)
-    # With the build's own compiler and flags: a library of a sanitizer's build wants the sanitizer.
-    flags = [f"-D{line}" for line in (BUILD / "CMakeCache.txt").read_text().splitlines()
-             if line.startswith(("CMAKE_CXX_COMPILER:", "CMAKE_BUILD_TYPE:", "CMAKE_CXX_FLAGS"))]
-    run("cmake", "-S", source, "-B", work / "build", f"-DCMAKE_PREFIX_PATH={prefix}", *flags,
-        "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON")
-    run("cmake", "--build", work / "build")
-    for name in ("consumer", "scene_only"):
-        if not (work / "build" / name).exists(): # its build has said why
-            continue
-        print(run(work / "build" / name), end="")
-        linked = run("ldd", work / "build" / name)
-        check("libmpi" not in linked and "hdf5" not in linked, f"{name} is linked with MPI or HDF5:\n{linked}")
+        source = work / "consumer"
+        source.mkdir()
+        (source / "CMakeLists.txt").write_text(CMAKE)
+        (source / "main.cpp").write_text(SOLVER)
+        (source / "scene.cpp").write_text(SCENE)
+        # With the build's own compiler and flags: a library of a sanitizer's build wants the sanitizer.
+        flags = [
+            f"-D{line}"
+            for line in (BUILD / "CMakeCache.txt").read_text().splitlines()
+            if line.startswith(("CMAKE_CXX_COMPILER:", "CMAKE_BUILD_TYPE:", "CMAKE_CXX_FLAGS"))
+        ]
+        run(
+            "cmake",
+            "-S",
+            source,
+            "-B",
+            work / "build",
+            f"-DCMAKE_PREFIX_PATH={prefix}",
+            *flags,
+            "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON",
+            "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON",
+        )
+        run("cmake", "--build", work / "build")
+        for name in ("consumer", "scene_only"):
+            if not (work / "build" / name).exists():  # its build has said why
+                continue
+            print(run(work / "build" / name), end="")
+            linked = run("ldd", work / "build" / name)
+            need("libmpi" not in linked and "hdf5" not in linked, f"{name} is linked with MPI or HDF5:\n{linked}")
 
-    # The control: another version is refused.
-    (source / "CMakeLists.txt").write_text(CMAKE.replace("kuzure 0.1", "kuzure 7.0"))
-    run("cmake", "-S", source, "-B", work / "other", f"-DCMAKE_PREFIX_PATH={prefix}", expected=1)
+        # The control: another version is refused.
+        (source / "CMakeLists.txt").write_text(CMAKE.replace("kuzure 0.1", "kuzure 7.0"))
+        run("cmake", "-S", source, "-B", work / "other", f"-DCMAKE_PREFIX_PATH={prefix}", expected=1)
 
-for what in FAILED:
-    print(what)
-sys.exit(bool(FAILED))
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,13 +1,18 @@
 #!/usr/bin/python3
 """kuzure picture: the run's own pictures again, other colours and views, one moment, and what is wrong said with its exit code."""
-import glob, json, os, shutil, struct, subprocess, sys, tempfile
+import glob
+import json
+import os
+import struct
+import subprocess
+import sys
 
 import h5py
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, failures, program
+from harness import block, check, finish, program, scratch
 
-work = tempfile.mkdtemp(prefix="kuzure-picture-")
+work = scratch("picture")
 
 
 def call(*args, expect=0, ranks=1):
@@ -25,34 +30,25 @@ def size(png):
     return struct.unpack(">II", png[16:24])
 
 
-SCENE = """title = "{title}"
-dimensions = {dimensions}
-[space]
-spacing = 0.05
-[time]
-end = 0.02
-[soil.sand]
-density = 1850.0
-young = 1.0e6
-poisson = 0.3
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = {{ low = [0.0, 0.0, 0.0], high = [0.3, 0.3, 0.3] }}
-[[wall]]
-box = {{ low = [-0.3, -0.3, -0.15], high = [0.6, 0.6, 0.0] }}
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = {{ alpha = 0.1 }}
-[output]
-every = 0.005
-fields = ["stress"]
-picture = {{ view = "oblique", color = "displacement" }}
-"""
-try:
-    for name, dimensions, title in (("solid", 3, "砂の崩壊 3-D"), ("flat", 2, "plane strain")):
+def scene(title, flat):
+    return block(
+        (0.3, 0 if flat else 0.3, 0.3),
+        ((-0.3, -0.3, -0.15), (0.6, 0.6, 0)),
+        title=title,
+        young="1.0e6",
+        spacing=0.05,
+        h=None,
+        end=0.02,
+        step=None,
+        effects="viscosity = { alpha = 0.1 }",
+        output='every = 0.005\nfields = ["stress"]\npicture = { view = "oblique", color = "displacement" }',
+    )
+
+
+def main():
+    for name, title in (("solid", "砂の崩壊 3-D"), ("flat", "plane strain")):
         with open(os.path.join(work, name + ".toml"), "w") as f:
-            f.write(SCENE.format(dimensions=dimensions, title=title))
+            f.write(scene(title, name == "flat"))
     call("run", "solid.toml", "-o", "solid", "--quiet", "--threads", "1")
     call("run", "solid.toml", "-o", "shared", "--quiet", "--threads", "1", ranks=2)
     own = contents("solid/picture_*.png")
@@ -60,8 +56,13 @@ try:
     check(len(own) == len(snapshots) == 5 and len({size(p) for p in own.values()}) == 1, "a picture a snapshot, all of one size")
     check(contents("shared/picture_*.png") == own, "two ranks draw the same bytes")
     with h5py.File(snapshots[-1]) as f:
-        check(set(f["VTKHDF/PointData"]) == {"id", "kind", "soil", "stress", "displacement"}, "what colours the pictures is in the snapshots")
-    check(json.load(open(work + "/solid/summary.json"))["walls_in"] == ["snapshots/state_000000.hdf", "snapshots/walls.hdf"], "the summary says where the walls are")
+        check(
+            set(f["VTKHDF/PointData"]) == {"id", "kind", "soil", "stress", "displacement"}, "what colours the pictures is in the snapshots"
+        )
+    check(
+        json.load(open(work + "/solid/summary.json"))["walls_in"] == ["snapshots/state_000000.hdf", "snapshots/walls.hdf"],
+        "the summary says where the walls are",
+    )
 
     # ---- afterwards
     for f in glob.glob(work + "/solid/picture_*.png"):
@@ -70,7 +71,10 @@ try:
     check(contents("solid/picture_*.png") == own, "drawn anew, with three threads, they have the same bytes")
     check(said == [f"solid/{n}" for n in own], "their names are said")
     said = call("picture", "solid", "--color", "pressure", "--view", "cut", "--at", "0.011").stdout.split()
-    check(said == ["solid/picture_pressure_cut_000002.png"] and os.path.exists(work + "/" + said[0]), "one moment in other colours, under a name of its own")
+    check(
+        said == ["solid/picture_pressure_cut_000002.png"] and os.path.exists(work + "/" + said[0]),
+        "one moment in other colours, under a name of its own",
+    )
     call("picture", "solid", "--color", "stress_zz", "--view", "side", "--range", "-5e3", "0", "-o", "end.png")
     check(os.path.exists(work + "/end.png"), "-o: the end, into that file")
     call("picture", "solid", "--at", "0.02", "-o", "same.png", ranks=2)
@@ -87,7 +91,10 @@ try:
     # ---- what is wrong
     before = contents("solid/*.*")
     wrong = call("picture", "solid", "--color", "presure", expect=2).stderr
-    check("presure" in wrong and 'did you mean "pressure"' in wrong and "displacement" in wrong, "an unknown field: the nearest and all known ones are named")
+    check(
+        "presure" in wrong and 'did you mean "pressure"' in wrong and "displacement" in wrong,
+        "an unknown field: the nearest and all known ones are named",
+    )
     check("[output] fields" in call("picture", "solid", "--color", "speed", expect=2).stderr, "a field that was not kept: how to keep it")
     check("oblique, side, top, cut" in call("picture", "solid", "--view", "front", expect=2).stderr, "an unknown view")
     check("0 to 0.02" in call("picture", "solid", "--at", "3", expect=2).stderr, "a time after the end: the times there are")
@@ -108,15 +115,38 @@ try:
     check("no snapshot" in call("picture", "solid", expect=4).stderr, "no snapshots at all")
 
     # ---- a run that fails, and one that goes on after a stop
-    call("run", "flat.toml", "-o", "failed", "--quiet", "--threads", "1", "--force-step", "--set", "time.step=8e-3", "--set", "time.end=8.0", "--set", "output.every=0.02", expect=3)
+    call(
+        "run",
+        "flat.toml",
+        "-o",
+        "failed",
+        "--quiet",
+        "--threads",
+        "1",
+        "--force-step",
+        "--set",
+        "time.step=8e-3",
+        "--set",
+        "time.end=8.0",
+        "--set",
+        "output.every=0.02",
+        expect=3,
+    )
     failed = contents("failed/picture_*.png")
-    check(len(failed) == len(glob.glob(work + "/failed/snapshots/state_*.hdf")), "a run that failed has its pictures, the last of the moment")
+    check(
+        len(failed) == len(glob.glob(work + "/failed/snapshots/state_*.hdf")), "a run that failed has its pictures, the last of the moment"
+    )
     call("picture", "failed")
     check(contents("failed/picture_*.png") == failed, "with the ring around what failed, also when drawn anew")
     open(work + "/flat/picture_000009.png", "wb").close()
     call("run", "flat.toml", "-o", "flat", "--quiet", "--threads", "1", "--restart", "--set", "time.end=0.03")
     names = list(contents("flat/picture_*.png"))
-    check(names == [f"picture_{k:06d}.png" for k in range(len(glob.glob(work + "/flat/snapshots/state_*.hdf")))], f"after a restart: all of them, and none of other snapshots {names}")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-sys.exit(f"{len(failures)} of the checks failed" if failures else 0)
+    check(
+        names == [f"picture_{k:06d}.png" for k in range(len(glob.glob(work + "/flat/snapshots/state_*.hdf")))],
+        f"after a restart: all of them, and none of other snapshots {names}",
+    )
+    finish()
+
+
+if __name__ == "__main__":
+    main()

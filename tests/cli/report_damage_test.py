@@ -1,61 +1,54 @@
 #!/usr/bin/python3
 """kuzure report on results that were damaged, or made to do harm: it ends soon, within its memory, with a page or a message that names the
 file. Every file of a result directory in turn, each kind of damage. Run as report_damage_test.py PROGRAM."""
-import json, os, random, resource, shutil, subprocess, sys, tempfile, time
+import json
+import os
+import random
+import resource
+import shutil
+import subprocess
+import sys
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, failures, finish, program
+from harness import block, check, failures, finish, program, scratch
 
-work = tempfile.mkdtemp(prefix="kuzure-damage-")
+work = scratch("damage")
 os.environ.update(OMP_NUM_THREADS="1", XDG_CACHE_HOME=work + "/cache")
 
 
-SCENE = """title = "a block"
-dimensions = 2
-[space]
-spacing = 0.04
-h = 1.2
-[time]
-end = 0.004
-step = 1.0e-4
-[soil.sand]
-density = 1850.0
-young = 1.8e6
-poisson = 0.3
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = { low = [0.0, 0.0, 0.0], high = [0.32, 0.0, 0.32] }
-[[wall]]
-box = { low = [-0.4, 0.0, -0.16], high = [0.72, 0.0, 0.0] }
-[effects]
-gravity = [0.0, 0.0, -9.81]
-[output]
-every = 0.002
-history = 0.0005
-picture = { view = "cut", color = "speed" }
-"""
+SCENE = block(
+    (0.32, 0, 0.32), ((-0.4, 0, -0.16), (0.72, 0, 0)), output='every = 0.002\nhistory = 0.0005\npicture = { view = "cut", color = "speed" }'
+)
 limit = 3 << 30  # bytes of address space
 
 
 def report(what, name=None, expect=(0,)):
     begin = time.monotonic()
     try:
-        done = subprocess.run([program, "report", "r"], cwd=work, capture_output=True, text=True, timeout=60,
-                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+        done = subprocess.run(
+            [program, "report", "r"],
+            cwd=work,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        )
     except subprocess.TimeoutExpired:
         check(False, f"{what}: does not end")
         return
     page = open(work + "/r/report.html", encoding="utf-8").read() if done.returncode == 0 else ""
     words = done.stderr + page
     named = name is None or os.path.basename(name) in words
-    sound = "[json.exception" not in words and "defect" not in words and "std::" not in words and ">nan" not in page and len(page) < 20 << 20
+    sound = (
+        "[json.exception" not in words and "defect" not in words and "std::" not in words and ">nan" not in page and len(page) < 20 << 20
+    )
     if done.returncode in expect and named and sound:
         return
     check(False, f"{what}: exit {done.returncode}, named {named}, sound {sound}, {time.monotonic() - begin:.1f} s: {done.stderr[-200:]!r}")
 
 
-try:
+def main():
     with open(work + "/s.toml", "w") as f:
         f.write(SCENE)
     made = subprocess.run([program, "run", "s.toml", "-o", "whole", "-q"], cwd=work, capture_output=True, text=True)
@@ -80,26 +73,52 @@ try:
     for name in files:
         path = f"{work}/r/{name}"
         whole = open(f"{work}/whole/{name}", "rb").read()
-        anew(); os.remove(path); os.mkdir(path); report(f"{name} is a directory", None); count += 1
-        anew(); os.remove(path); os.mkfifo(path); report(f"{name} is a pipe", None); count += 1
-        anew(); os.remove(path); os.symlink("/dev/zero", path); report(f"{name} is /dev/zero", None); count += 1
-        anew(); os.chmod(path, 0); report(f"{name} may not be read", None); count += 1
-        anew(); os.remove(path); report(f"{name} is missing"); count += 1
+        anew()
+        os.remove(path)
+        os.mkdir(path)
+        report(f"{name} is a directory", None)
+        count += 1
+        anew()
+        os.remove(path)
+        os.mkfifo(path)
+        report(f"{name} is a pipe", None)
+        count += 1
+        anew()
+        os.remove(path)
+        os.symlink("/dev/zero", path)
+        report(f"{name} is /dev/zero", None)
+        count += 1
+        anew()
+        os.chmod(path, 0)
+        report(f"{name} may not be read", None)
+        count += 1
+        anew()
+        os.remove(path)
+        report(f"{name} is missing")
+        count += 1
         for data in [b"", b"\0" * 1000, b"\xff\xfe" * 500, bytes(noise.randrange(256) for _ in range(5000)), whole + whole, whole[::-1]]:
-            put(name, data); report(f"{name} of {data[:12]!r}"); count += 1
+            put(name, data)
+            report(f"{name} of {data[:12]!r}")
+            count += 1
         for part in range(1, 5):
-            put(name, whole[:len(whole) * part // 5]); report(f"{name} cut at {part}/5"); count += 1
+            put(name, whole[: len(whole) * part // 5])
+            report(f"{name} cut at {part}/5")
+            count += 1
         for k in range(4):
             bent = bytearray(whole)
             for _ in range(20):
                 bent[noise.randrange(len(bent))] = noise.randrange(256)
-            put(name, bytes(bent)); report(f"{name} bent, {k}"); count += 1
+            put(name, bytes(bent))
+            report(f"{name} bent, {k}")
+            count += 1
         anew()
         with open(path, "wb") as f:
             f.truncate(4 << 30)
-        report(f"{name} of 4 GiB", name if name.endswith((".json", ".csv", ".toml", ".png")) else None); count += 1
+        report(f"{name} of 4 GiB", name if name.endswith((".json", ".csv", ".toml", ".png")) else None)
+        count += 1
     # ---- JSON: every key of every file with a value of every other kind
     odd = [None, True, -1, 0, 1e308, -1e308, 5e-324, 10**30, "x", "\x1b[2J", "", [], {}, [[1]], {"a": 1}, [None] * 5, "9" * 5000]
+
     def places(j, path=()):
         if isinstance(j, dict):
             for key, value in j.items():
@@ -108,6 +127,7 @@ try:
         elif isinstance(j, list) and j:
             yield path + (0,)
             yield from places(j[0], path + (0,))
+
     for name in ("summary.json", "timers.json"):
         whole = open(f"{work}/whole/{name}").read()
         j = json.loads(whole)
@@ -125,20 +145,49 @@ try:
                 for key in place[:-1]:
                     here = here[key]
                 here[place[-1]] = value
-                put(name, json.dumps(bent)); report(f"{name}: {'.'.join(map(str, place))} = {value!r:.30}"); count += 1
-        put(name, "[" * 200000 + "]" * 200000); report(f"{name}: 200000 deep", name); count += 1
-        put(name, '{"a":' * 200000 + "1" + "}" * 200000); report(f"{name}: tables 200000 deep", name); count += 1
-        put(name, '{"warnings": [' + '"w",' * 2000000 + '"w"]}'); report(f"{name}: two million warnings"); count += 1
+                put(name, json.dumps(bent))
+                report(f"{name}: {'.'.join(map(str, place))} = {value!r:.30}")
+                count += 1
+        put(name, "[" * 200000 + "]" * 200000)
+        report(f"{name}: 200000 deep", name)
+        count += 1
+        put(name, '{"a":' * 200000 + "1" + "}" * 200000)
+        report(f"{name}: tables 200000 deep", name)
+        count += 1
+        put(name, '{"warnings": [' + '"w",' * 2000000 + '"w"]}')
+        report(f"{name}: two million warnings")
+        count += 1
     # ---- tables: numbers that no axis holds, columns and rows without end
     head = open(work + "/whole/history.csv").read().split("\n")
     columns = head[0].count(",") + 1
-    for a, b in [("1e16", "10000000000000002"), ("0", "5e-324"), ("-1e308", "1e308"), ("1e100", "1e101"), ("0", "inf"), ("nan", "1"), ("1", "1"), ("2", "1")]:
-        put("history.csv", "\n".join(head[:2] + [",".join([x] * columns) for x in (a, b)]) + "\n"); report(f"history.csv from {a} to {b}"); count += 1
-        put("progress.csv", "\n".join(open(work + "/whole/progress.csv").read().split("\n")[:1] + [",".join([x] * 6) for x in ("#", a, b)]) + "\n")
-        report(f"progress.csv from {a} to {b}"); count += 1
-    put("history.csv", "," * 30000000); report("history.csv of 30 million columns", "history.csv"); count += 1
-    put("history.csv", ",".join(f"a{k}" for k in range(1000)) + "\n#\n" + "\n" * 20000000); report("history.csv of 20 million empty rows"); count += 1
+    for a, b in [
+        ("1e16", "10000000000000002"),
+        ("0", "5e-324"),
+        ("-1e308", "1e308"),
+        ("1e100", "1e101"),
+        ("0", "inf"),
+        ("nan", "1"),
+        ("1", "1"),
+        ("2", "1"),
+    ]:
+        put("history.csv", "\n".join(head[:2] + [",".join([x] * columns) for x in (a, b)]) + "\n")
+        report(f"history.csv from {a} to {b}")
+        count += 1
+        put(
+            "progress.csv",
+            "\n".join(open(work + "/whole/progress.csv").read().split("\n")[:1] + [",".join([x] * 6) for x in ("#", a, b)]) + "\n",
+        )
+        report(f"progress.csv from {a} to {b}")
+        count += 1
+    put("history.csv", "," * 30000000)
+    report("history.csv of 30 million columns", "history.csv")
+    count += 1
+    put("history.csv", ",".join(f"a{k}" for k in range(1000)) + "\n#\n" + "\n" * 20000000)
+    report("history.csv of 20 million empty rows")
+    count += 1
     check(len(failures) == 0, f"{count} damaged directories")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-finish()
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -9,45 +9,21 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 
-program = os.path.abspath(sys.argv[1])
-work = tempfile.mkdtemp(prefix="kuzure-report-")
-failures = []
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import block, check, finish, program, scratch
+
+work = scratch("report")
 os.environ["XDG_CACHE_HOME"] = work + "/cache"  # roofs measured beside other tests are not for keeping
 SECTIONS = ["warnings", "pictures", "energy", "heap", "phases", "roofline", "balance", "effects", "provenance", "scene"]
-SCENE = """title = "<b>sand</b> & 'clay' <script>alert(1)</script>"
-dimensions = 2
-[space]
-spacing = 0.04
-h = 1.2
-[time]
-end = 0.02
-step = 1.0e-4
-[soil.sand]
-density = 1850.0
-young = 1.8e6
-poisson = 0.3
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = { low = [0.0, 0.0, 0.0], high = [0.32, 0.0, 0.32] }
-[[wall]]
-box = { low = [-0.4, 0.0, -0.16], high = [0.72, 0.0, 0.0] }
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = { alpha = 0.1, beta = 0.0 }
-[output]
-every = 0.01
-history = 0.001
-picture = { view = "cut", color = "speed" }
-"""
-
-
-def check(condition, text):
-    print(("ok      " if condition else "FAILED  ") + text)
-    if not condition:
-        failures.append(text)
+SCENE = block(
+    (0.32, 0, 0.32),
+    ((-0.4, 0, -0.16), (0.72, 0, 0)),
+    title="<b>sand</b> & 'clay' <script>alert(1)</script>",
+    end=0.02,
+    effects="viscosity = { alpha = 0.1, beta = 0.0 }",
+    output='every = 0.01\nhistory = 0.001\npicture = { view = "cut", color = "speed" }',
+)
 
 
 class Page(html.parser.HTMLParser):
@@ -89,7 +65,10 @@ class Page(html.parser.HTMLParser):
 
 def run(*args, expect=0):
     r = subprocess.run([program, *args], cwd=work, capture_output=True, text=True)
-    check(r.returncode == expect, f"exit {expect} of {' '.join(args)[:70]}" + ("" if r.returncode == expect else f": {r.returncode} {r.stderr}"))
+    check(
+        r.returncode == expect,
+        f"exit {expect} of {' '.join(args)[:70]}" + ("" if r.returncode == expect else f": {r.returncode} {r.stderr}"),
+    )
     return r
 
 
@@ -115,16 +94,33 @@ def sideways(directory):
     """Pixels by which the page is wider than a window of 390 and of 1280, as Chromium lays it out."""
     wrapper = f"{work}/{directory}/wrapper.html"
     with open(wrapper, "w") as f:
-        f.write("<!doctype html><body>" + "".join(f'<iframe src="report.html" width="{w}" height="800" style="border:0"></iframe>' for w in (390, 1280))
-                + "<script>onload=()=>{document.title=[...document.querySelectorAll('iframe')].map(f=>"
-                  "f.contentDocument.documentElement.scrollWidth-f.clientWidth).join(' ')}</script>")
-    r = subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--virtual-time-budget=4000",
-                        f"--user-data-dir={work}/chromium", "--dump-dom", "file://" + wrapper], capture_output=True, text=True, timeout=240)
+        f.write(
+            "<!doctype html><body>"
+            + "".join(f'<iframe src="report.html" width="{w}" height="800" style="border:0"></iframe>' for w in (390, 1280))
+            + "<script>onload=()=>{document.title=[...document.querySelectorAll('iframe')].map(f=>"
+            "f.contentDocument.documentElement.scrollWidth-f.clientWidth).join(' ')}</script>"
+        )
+    r = subprocess.run(
+        [
+            "chromium",
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--allow-file-access-from-files",
+            "--virtual-time-budget=4000",
+            f"--user-data-dir={work}/chromium",
+            "--dump-dom",
+            "file://" + wrapper,
+        ],
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
     found = re.search(r"<title>(-?\d+) (-?\d+)</title>", r.stdout)
     return [int(x) for x in found.groups()] if found else r.stderr[-300:]
 
 
-try:
+def main():
     open(work + "/s.toml", "w").write(SCENE)
     done = run("run", "s.toml", "-o", "done")
     check("predicted" in done.stdout and "report.html" in done.stdout, "a run says what was predicted and where its report is")
@@ -140,8 +136,10 @@ try:
     check(progress[0] == "time,step,dt,wall,steps_per_second,balance" and len(progress) > 50, "progress.csv has its rows")
     run("run", "s.toml", "-o", "failed", "--quiet", "--force-step", "--set", "time.step=7.2e-3", "--set", "time.end=7.2", expect=3)
     p, text = page("failed", "the numbers broke (exit code 3)", "failed")
-    check("the moment of failure" in p.text and "the last picture before it" in p.text and text.count("data:image/png") == 3,
-          "a failed run shows its moment and the last picture before it")
+    check(
+        "the moment of failure" in p.text and "the last picture before it" in p.text and text.count("data:image/png") == 3,
+        "a failed run shows its moment and the last picture before it",
+    )
     run("run", "s.toml", "-o", "stopped", "--quiet", "--set", "time.end=50", "--max-minutes", "0.05", expect=5)
     p, _ = page("stopped", "Stopped on request", "stopped")
     check("of 50 s" in p.text, "a stopped run says how far it came")
@@ -158,7 +156,7 @@ try:
         f.write("0.003,30,1e-4,12")  # torn
     page("bare", "No end was recorded", "half-written")
     open(work + "/bare/summary.json", "w").write('{"status": 3, "energy": [], "effects": {"on": [1]}, "warn')
-    open(work + "/bare/timers.json", "w").write('[]')
+    open(work + "/bare/timers.json", "w").write("[]")
     page("bare", "No end was recorded", "damaged")
     os.mkdir(work + "/empty")
     check("result directory" in run("report", "empty", expect=2).stderr, "what is no result directory is refused")
@@ -173,7 +171,8 @@ try:
         check(isinstance(wide, list) and max(wide) <= 0, f"no window of 390 or 1280 pixels scrolls sideways {wide}")
     else:
         print("skipped  the layout in a browser: no chromium")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-print(f"{len(failures)} failures")
-sys.exit(1 if failures else 0)
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,11 +1,14 @@
 #!/usr/bin/python3
 """kuzure scale against kuzure run: what is counted for a number of ranks is what that many ranks then do, to the particle."""
-import json, os, shutil, subprocess, sys, tempfile
+import json
+import os
+import subprocess
+import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, program
+from harness import check, finish, program, scratch
 
-work = tempfile.mkdtemp(prefix="kuzure-scale-")
+work = scratch("scale")
 
 
 def call(*command, expect=0):
@@ -27,8 +30,16 @@ def run(scene, ranks, out, *extra):
 
 
 def counted(case):
-    return [{"soil": r["soil"], "pairs": r["soil_pairs"] + r["wall_pairs"], "ghosts": r["ghosts"], "halo_bytes": r["halo_bytes"],
-             "messages": r["messages"]} for r in case["per_rank"]]
+    return [
+        {
+            "soil": r["soil"],
+            "pairs": r["soil_pairs"] + r["wall_pairs"],
+            "ghosts": r["ghosts"],
+            "halo_bytes": r["halo_bytes"],
+            "messages": r["messages"],
+        }
+        for r in case["per_rank"]
+    ]
 
 
 SAND = """[soil.sand]
@@ -95,7 +106,9 @@ box = { low = [0.0, 0.0, 0.0], high = [0.8, 0.0, 0.5] }
 [[wall]]
 box = { low = [-0.5, 0.0, -0.04], high = [1.5, 0.0, 0.0] }
 """
-try:
+
+
+def main():
     scenes = {
         "cube": (CUBE, dict(cohesion=0.0, precision="double"), (2, 4, 7)),
         "round": (ROUND, dict(cohesion=3000.0, precision="double"), (2, 7)),
@@ -110,8 +123,10 @@ try:
         for n in ranks:
             did = run(files[name], n, f"{name}-{n}")
             check(did["first_step"] == counted(cases[n]), f"{name} on {n} ranks does what was counted: {did['first_step']}")
-            check(did["halo_bytes"] == cases[n]["halo_bytes_per_step"] and did["messages"] == cases[n]["messages_per_step"],
-                  f"{name} on {n} ranks sends what was counted: {did['halo_bytes']} bytes, {did['messages']} messages")
+            check(
+                did["halo_bytes"] == cases[n]["halo_bytes_per_step"] and did["messages"] == cases[n]["messages_per_step"],
+                f"{name} on {n} ranks sends what was counted: {did['halo_bytes']} bytes, {did['messages']} messages",
+            )
             if min(r["soil"] for r in did["first_step"]) >= 2000:
                 check(cases[n]["pair_balance"] <= 1.05, f"{name} on {n} ranks: pairs {cases[n]['pair_balance']:.3f} of the mean at most")
     # The control: other lists reach further and see more ghosts.
@@ -124,7 +139,9 @@ try:
     check(many[1]["predicted_efficiency"] == 1 and many[64]["predicted_efficiency"] < 1, "efficiency counts from the smallest")
     slow = many[64]["predicted_seconds_per_step_if"]
     check(slow["latency_doubled"] > many[64]["predicted_seconds_per_step"] <= slow["bandwidth_halved"], "worse networks take longer")
-    check(abs(sum(many[64]["predicted_step"].values()) / many[64]["predicted_seconds_per_step"] - 1) < 1e-9, "parts of the step add up to it")
+    check(
+        abs(sum(many[64]["predicted_step"].values()) / many[64]["predicted_seconds_per_step"] - 1) < 1e-9, "parts of the step add up to it"
+    )
 
     # A later state: 400 steps on 3 ranks, then counted and run for 4. The run's ghosts are those of the last sort, from which
     # particles have moved on since: nearly as many, not exactly.
@@ -133,7 +150,23 @@ try:
     state = os.path.join(work, "later")
     case = scale(files["cube"], [4], *later, "--from", state)[4]
     check(case["pair_balance"] <= 1.05, f"the later state is shared evenly: {case['pair_balance']:.3f}")
-    call("mpirun", "-n", "4", program, "run", files["cube"], "-o", state, "--threads", "1", "--quiet", "--restart", *later, "--set", "time.end=0.0401")
+    call(
+        "mpirun",
+        "-n",
+        "4",
+        program,
+        "run",
+        files["cube"],
+        "-o",
+        state,
+        "--threads",
+        "1",
+        "--quiet",
+        "--restart",
+        *later,
+        "--set",
+        "time.end=0.0401",
+    )
     with open(os.path.join(state, "timers.json")) as f:
         did = json.load(f)["first_step"]
     for key in ("soil", "pairs", "ghosts"):
@@ -151,6 +184,8 @@ try:
     ):
         done = call(program, "scale", *command, expect=2)
         check(words in done.stderr, f"{what}: the message says so: {done.stderr.strip()[:200]}")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-finish()
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -13,29 +13,21 @@ import time
 import unittest
 from pathlib import Path
 
-PROGRAM = os.path.abspath(sys.argv.pop(1))
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import block, program
 
-SCENE = """title = "block"
-dimensions = 2
-[space]
-spacing = 0.1
-[time]
-end = 0.15
-[soil.sand]
-density = 1850.0
-young = 0.2e6
-poisson = 0.3
-friction_angle = 25.0
-cone = "plane strain"
-[[body]]
-soil = "sand"
-box = { low = [0.0, 0.0, 0.0], high = [0.8, 0.0, 0.8] }
-[[wall]]
-box = { low = [-1.2, 0.0, -0.4], high = [2.4, 0.0, 0.0] }
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = { alpha = 0.1, beta = 0.0 }
-"""
+SCENE = block(
+    (0.8, 0, 0.8),
+    ((-1.2, 0, -0.4), (2.4, 0, 0)),
+    title="block",
+    young="0.2e6",
+    spacing=0.1,
+    h=None,
+    end=0.15,
+    step=None,
+    soil='cone = "plane strain"',
+    effects="viscosity = { alpha = 0.1, beta = 0.0 }",
+)
 SWEEP = """scene = "block.toml"
 title = "tiny"
 measures = ["profile", "run-out", "residual"]
@@ -57,7 +49,7 @@ name = "does not fill"
 
 
 def kuzure(*arguments, **more):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **more)
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300, **more)
 
 
 class Study(unittest.TestCase):
@@ -158,7 +150,7 @@ class Study(unittest.TestCase):
 
     def test_a_stop_is_passed_on_and_the_study_goes_on_later(self):
         (self.dir / "block.toml").write_text(SCENE.replace("end = 0.15", "end = 60.0"))
-        running = subprocess.Popen([PROGRAM, "study", self.dir / "sweep.toml", "-o", self.dir / "out"], stdout=subprocess.PIPE, text=True)
+        running = subprocess.Popen([program, "study", self.dir / "sweep.toml", "-o", self.dir / "out"], stdout=subprocess.PIPE, text=True)
         limit = time.monotonic() + 60
         while not list(self.dir.glob("out/points/*/run/history.csv")) and time.monotonic() < limit:
             time.sleep(0.05)
@@ -186,7 +178,17 @@ class Study(unittest.TestCase):
         for factor in (4, 2):
             self.assertTrue((self.dir / f"twins/twins/x{factor}/summary.json").exists())
         # A scene whose twins cannot be filled runs all the same, and says why it has no error bars.
-        thin = kuzure("run", self.dir / "block.toml", "-o", self.dir / "thin", "--twins", "--set", "body.0.box.high=[0.8,0.0,0.1]", "--set", "time.end=0.01")
+        thin = kuzure(
+            "run",
+            self.dir / "block.toml",
+            "-o",
+            self.dir / "thin",
+            "--twins",
+            "--set",
+            "body.0.box.high=[0.8,0.0,0.1]",
+            "--set",
+            "time.end=0.01",
+        )
         self.assertEqual(thin.returncode, 0, thin.stderr)
         self.assertIn("the twin of 4 times the spacing failed", thin.stdout)
         self.assertIn("no interval", thin.stdout)
@@ -206,4 +208,4 @@ class Study(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    unittest.main(argv=sys.argv[:1], verbosity=2)

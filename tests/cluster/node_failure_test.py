@@ -2,10 +2,17 @@
 """A node of two fails at random moments: its processes end, or its network does. The run, resumed by --restart, must end with the
 bits of the undisturbed one. Virtual nodes (vcluster.sh), so root only; as node_failure_test.py PROGRAM FAILURES FILE.json so many
 failures, and the record is written there: docs/reliability.json holds it."""
-import json, os, random, re, signal, subprocess, sys, time
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "faults"))
-from faults import Place, check, end, kill, program, same_results, scene_text, wait_for
+from faults import Place, check, finish, kill, program, same_results, scene_text, wait_for
 from kills import changed
 
 CLUSTER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "vcluster.sh")
@@ -21,8 +28,14 @@ def start(place, scene, out, each):
     """The run on two nodes, and what it says in a file."""
     environment = {k: v for k, v in place.environment.items() if k != "OMPI_MCA_btl_vader_backing_directory"}  # each node its own
     said = open(place(out + ".said"), "w")
-    return subprocess.Popen(["bash", CLUSTER, "run", "2", str(each), program, "run", scene, "-o", place(out), "--threads", "1", "--restart"],
-                            stdout=said, stderr=said, env=environment, cwd=place.path, start_new_session=True)
+    return subprocess.Popen(
+        ["bash", CLUSTER, "run", "2", str(each), program, "run", scene, "-o", place(out), "--threads", "1", "--restart"],
+        stdout=said,
+        stderr=said,
+        env=environment,
+        cwd=place.path,
+        start_new_session=True,
+    )
 
 
 def on_node(node):
@@ -95,9 +108,17 @@ def fail_once(place, scene, out, rng, record):
 
 def campaign(failures, seed, failures_a_run=5):
     rng = random.Random(seed)
-    record = {"seed": seed, "failures": 0, "by_kind": {"processes": 0, "network": 0}, "by_node": {"node1": 0, "node2": 0},
-              "noticed_by_mpirun": {"processes": 0, "network": 0}, "during_a_checkpoint_write": 0, "resumed_from_previous": 0, "runs": 0,
-              "runs_with_the_bits_of_the_undisturbed_one": 0}
+    record = {
+        "seed": seed,
+        "failures": 0,
+        "by_kind": {"processes": 0, "network": 0},
+        "by_node": {"node1": 0, "node2": 0},
+        "noticed_by_mpirun": {"processes": 0, "network": 0},
+        "during_a_checkpoint_write": 0,
+        "resumed_from_previous": 0,
+        "runs": 0,
+        "runs_with_the_bits_of_the_undisturbed_one": 0,
+    }
     with Place("nodes") as place:
         scene = place.write("scene.toml", scene_text(end=0.03, checkpoint=1e-6))
         place.run(place.write("calm.toml", scene_text(end=0.03)), "calm")
@@ -118,20 +139,25 @@ def campaign(failures, seed, failures_a_run=5):
     return record
 
 
-ready = cluster("up", "2")
-if ready.returncode != 0:
-    print(f"skipped: no virtual nodes here: {ready.stderr.strip()}")
-    sys.exit(77)
-try:
-    wanted = int(sys.argv[2]) if len(sys.argv) > 2 else 8
-    record = campaign(wanted, seed=8)
-finally:
-    cluster("down")
-record["version"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()
-print(json.dumps(record, indent=1))
-check(record["failures"] == wanted, f"{record['failures']} failures of a node")
-check(record["runs_with_the_bits_of_the_undisturbed_one"] == record["runs"], "every run ended with the bits of the undisturbed one")
-if len(sys.argv) > 3:
-    with open(sys.argv[3], "w") as f:
-        json.dump(record, f, indent=1)
-end()
+def main():
+    ready = cluster("up", "2")
+    if ready.returncode != 0:
+        print(f"skipped: no virtual nodes here: {ready.stderr.strip()}")
+        sys.exit(77)
+    try:
+        wanted = int(sys.argv[2]) if len(sys.argv) > 2 else 8
+        record = campaign(wanted, seed=8)
+    finally:
+        cluster("down")
+    record["version"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()
+    print(json.dumps(record, indent=1))
+    check(record["failures"] == wanted, f"{record['failures']} failures of a node")
+    check(record["runs_with_the_bits_of_the_undisturbed_one"] == record["runs"], "every run ended with the bits of the undisturbed one")
+    if len(sys.argv) > 3:
+        with open(sys.argv[3], "w") as f:
+            json.dump(record, f, indent=1)
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,50 +1,34 @@
 """What the fault tests share: a place of their own, a small scene, starting kuzure and finding all of its processes, and
 what a run has left. Nothing here is a test."""
-import csv, json, os, shutil, signal, subprocess, sys, tempfile, time
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
 
 import h5py
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, program
+from harness import block, check, finish, program  # finish for those who take all from here
 
 
 # The law of equal bits lets any run here be compared with any other by its hash.
-SCENE = """title = "a block of wet sand thrown across the floor"
-dimensions = 3
-[space]
-spacing = 0.04
-h = 1.2
-[time]
-end = {end}
-step = 1.0e-4
-[soil.sand]
-density = 1850.0
-young = 1.8e6
-poisson = 0.3
-cohesion = 1000.0
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = {{ low = [0.0, 0.0, 0.0], high = [0.32, 0.24, 0.24] }}
-velocity = [2.0, 0.5, 0.0]
-[[wall]]
-box = {{ low = [-0.4, -0.4, -0.16], high = [1.2, 0.64, 0.0] }}
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = {{ alpha = 0.1 }}
-artificial_stress = "auto"
-[accuracy]
-skin = 0.05
-[output]
-history = 0.0005
-every = {every}
-checkpoint_minutes = {checkpoint}
-"""
-
-
 def scene_text(end=0.02, every=0.005, checkpoint=30.0):
-    return SCENE.format(end=end, every=every, checkpoint=checkpoint)
+    return block(
+        (0.32, 0.24, 0.24),
+        ((-0.4, -0.4, -0.16), (1.2, 0.64, 0)),
+        title="a block of wet sand thrown across the floor",
+        end=end,
+        soil="cohesion = 1000.0",
+        body="velocity = [2.0, 0.5, 0.0]",
+        effects='viscosity = { alpha = 0.1 }\nartificial_stress = "auto"',
+        accuracy="skin = 0.05",
+        output=f"history = 0.0005\nevery = {every}\ncheckpoint_minutes = {checkpoint}",
+    )
 
 
 class Place:
@@ -54,8 +38,12 @@ class Place:
         self.path = tempfile.mkdtemp(prefix=f"kuzure-{name}-")
         mpi = os.path.join(self.path, "mpi")
         os.mkdir(mpi)
-        self.environment = {**os.environ, "OMPI_MCA_orte_tmpdir_base": mpi, "OMPI_MCA_btl_vader_backing_directory": mpi,
-                            "OMP_NUM_THREADS": "1"}
+        self.environment = {
+            **os.environ,
+            "OMPI_MCA_orte_tmpdir_base": mpi,
+            "OMPI_MCA_btl_vader_backing_directory": mpi,
+            "OMP_NUM_THREADS": "1",
+        }
         self.mounted = []
 
     def __enter__(self):
@@ -90,18 +78,32 @@ class Place:
         return [*mpi, program, "run", scene, "-o", self(out), "--threads", "1", *more]
 
     def run(self, scene, out, *more, ranks=1, expect=0, timeout=300):
-        done = subprocess.run(self.command(scene, out, *more, ranks=ranks), capture_output=True, text=True, timeout=timeout,
-                              env=self.environment, cwd=self.path)
+        done = subprocess.run(
+            self.command(scene, out, *more, ranks=ranks),
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            env=self.environment,
+            cwd=self.path,
+        )
         expected = expect if isinstance(expect, (tuple, list)) else (expect,)
-        check(done.returncode in expected,
-              f"{os.path.basename(out)} {' '.join(more)} on {ranks}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}")
+        check(
+            done.returncode in expected,
+            f"{os.path.basename(out)} {' '.join(more)} on {ranks}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}",
+        )
         return done
 
     def start(self, scene, out, *more, ranks=1, said=None):
         # What is said goes to a file: a pipe that nobody reads would stop the ranks.
         said = open(self(said or os.path.basename(out) + ".said"), "w")
-        return subprocess.Popen(self.command(scene, out, *more, ranks=ranks), stdout=said, stderr=said, env=self.environment,
-                                cwd=self.path, start_new_session=True)
+        return subprocess.Popen(
+            self.command(scene, out, *more, ranks=ranks),
+            stdout=said,
+            stderr=said,
+            env=self.environment,
+            cwd=self.path,
+            start_new_session=True,
+        )
 
     def summary(self, out):
         with open(self(out, "summary.json")) as f:
@@ -181,6 +183,3 @@ def same_results(place, out, reference, name):
     left = [f for f in os.listdir(place(out)) + os.listdir(place(out, "snapshots")) if f.endswith(".tmp")]
     good &= check(not left, f"{name}: no half-written file is left {left}")
     return good
-
-
-end = finish

@@ -1,14 +1,27 @@
 """Every file operation of a short run fails once, and again with all after it failing too, with each error a system may give: the run ends
 with exit 0 (it could do without) or 4 and names its last good checkpoint, and the next start ends with the bits of the undisturbed run."""
-import errno, json, os, re, shutil, subprocess
+import errno
+import json
+import os
+import re
+import shutil
+import subprocess
 
-from faults import Place, check, program, same_results, scene_text
+from faults import check, program, same_results, scene_text
 
 LIBRARY = os.path.join(os.path.dirname(program), "tests", "libinject.so")
-ERRORS = {"open": (errno.EACCES, errno.EMFILE, errno.EIO), "create": (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO),
-          "read": (errno.EIO, errno.ESTALE), "write": (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO), "sync": (errno.EIO, errno.ENOSPC, errno.EDQUOT),
-          "rename": (errno.EIO, errno.ENOSPC, errno.EACCES), "truncate": (errno.EIO, errno.EFBIG), "allocate": (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EOPNOTSUPP),
-          "mkdir": (errno.ENOSPC, errno.EDQUOT, errno.EACCES), "unlink": (errno.EIO, errno.EACCES)}
+ERRORS = {
+    "open": (errno.EACCES, errno.EMFILE, errno.EIO),
+    "create": (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO),
+    "read": (errno.EIO, errno.ESTALE),
+    "write": (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO),
+    "sync": (errno.EIO, errno.ENOSPC, errno.EDQUOT),
+    "rename": (errno.EIO, errno.ENOSPC, errno.EACCES),
+    "truncate": (errno.EIO, errno.EFBIG),
+    "allocate": (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EOPNOTSUPP),
+    "mkdir": (errno.ENOSPC, errno.EDQUOT, errno.EACCES),
+    "unlink": (errno.EIO, errno.EACCES),
+}
 
 
 class Campaign:
@@ -27,8 +40,14 @@ class Campaign:
         self.good = {"fresh": self.count("fresh"), "restart": self.count("restart")}
 
     def go(self, out, *more, **environment):
-        return subprocess.run(self.place.command(self.scene, out, *more), capture_output=True, text=True, timeout=60, cwd=self.place.path,
-                              env={**self.environment, **environment})
+        return subprocess.run(
+            self.place.command(self.scene, out, *more),
+            capture_output=True,
+            text=True,
+            timeout=60,
+            cwd=self.place.path,
+            env={**self.environment, **environment},
+        )
 
     def begin(self, out, how):
         for name in os.listdir(self.place.path):

@@ -1,16 +1,24 @@
 #!/usr/bin/python3
 """Two hundred kills, recorded. As kill_long_test.py PROGRAM FILE.json the record is written there: docs/reliability.json holds it."""
-import json, subprocess, sys
+import json
+import subprocess
+import sys
 
-from faults import check, end, program
+from faults import check, finish, program
 from kills import campaign
 
-record = campaign(kills=200, seed=200)
-record["version"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()
-print(json.dumps(record, indent=1))
-check(record["kills"] == 200, f"{record['kills']} kills")
-check(record["runs_with_the_bits_of_the_undisturbed_one"] == record["runs"], "every run ended with the bits of the undisturbed one")
-if len(sys.argv) > 2:
-    with open(sys.argv[2], "w") as f:
-        json.dump(record, f, indent=1)
-end()
+
+def main():
+    record = campaign(kills=200, seed=200)
+    record["version"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()
+    print(json.dumps(record, indent=1))
+    check(record["kills"] == 200, f"{record['kills']} kills")
+    check(record["runs_with_the_bits_of_the_undisturbed_one"] == record["runs"], "every run ended with the bits of the undisturbed one")
+    if len(sys.argv) > 2:
+        with open(sys.argv[2], "w") as f:
+            json.dump(record, f, indent=1)
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,5 +1,9 @@
 """kill -9 at random moments, resumed by --restart until the run ends: it must end with the bits of the undisturbed run."""
-import os, random, re, signal, time
+import os
+import random
+import re
+import signal
+import time
 
 from faults import Place, check, kill, same_results, scene_text, wait_for
 
@@ -10,8 +14,18 @@ VICTIMS = ("one rank", "mpirun", "machine", "program without mpirun")
 def campaign(kills, seed, kills_a_run=5):
     """A record of what was tried and what came of it."""
     rng = random.Random(seed)
-    record = {"seed": seed, "kills": 0, "by_victim": {v: 0 for v in VICTIMS}, "during_a_checkpoint_write": 0, "between_two_renames": 0,
-              "before_the_first_checkpoint": 0, "second_starters": {"refused": 0, "took over": 0, "killed too": 0}, "runs": 0, "runs_with_the_bits_of_the_undisturbed_one": 0, "resumed_from_previous": 0}
+    record = {
+        "seed": seed,
+        "kills": 0,
+        "by_victim": {v: 0 for v in VICTIMS},
+        "during_a_checkpoint_write": 0,
+        "between_two_renames": 0,
+        "before_the_first_checkpoint": 0,
+        "second_starters": {"refused": 0, "took over": 0, "killed too": 0},
+        "runs": 0,
+        "runs_with_the_bits_of_the_undisturbed_one": 0,
+        "resumed_from_previous": 0,
+    }
     with Place("kills") as place:
         # So short an interval that a checkpoint is written at nearly every step.
         scene = place.write("scene.toml", scene_text(end=0.03, checkpoint=1e-6))
@@ -47,8 +61,11 @@ def kill_once(place, scene, out, rng, record):
     else:
         begun = os.stat(place(out, "checkpoint.h5")).st_mtime_ns if had and os.path.exists(place(out, "checkpoint.h5")) else 0
         # From the first new checkpoint on.
-        wait_for(lambda: process.poll() is not None
-                 or (os.path.exists(place(out, "checkpoint.h5")) and changed(place(out, "checkpoint.h5"), begun)), 60)
+        wait_for(
+            lambda: process.poll() is not None
+            or (os.path.exists(place(out, "checkpoint.h5")) and changed(place(out, "checkpoint.h5"), begun)),
+            60,
+        )
         time.sleep(rng.uniform(0, 0.6))
         if rng.random() < 0.5:
             wait_for(lambda: process.poll() is not None or os.path.exists(temporary), 5, every=0.0002)
@@ -86,7 +103,9 @@ def kill_once(place, scene, out, rng, record):
         check("no checkpoint in" not in said, f"{out}: with a checkpoint there it is never started from the beginning")
     record["resumed_from_previous"] += len(re.findall("Going back to", said))
     if not hit or process.returncode == 0:
-        check(process.returncode == 0 or bool(hit), f"{out}: ends by itself only when it is finished, exit {process.returncode} {said[-300:]}")
+        check(
+            process.returncode == 0 or bool(hit), f"{out}: ends by itself only when it is finished, exit {process.returncode} {said[-300:]}"
+        )
         return False
     record["kills"] += 1
     record["by_victim"][victim] += 1

@@ -1,7 +1,7 @@
 """The restart matrix: so many ranks before, so many after, the bits of a run that never stopped."""
-import os, shutil
+import shutil
 
-from faults import Place, check, history, same_results, scene_text
+from faults import Place, check, same_results, scene_text
 
 
 def matrix(pairs):

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Includes point one way. Run as layers_test.py PROGRAM (which is not used); exits 1 and names file and line of what breaks a rule."""
+"""Includes point one way, and files have one job: a long one says why it is. Run as layers_test.py PROGRAM (which is not used); exits 1 and names file and line of what breaks a rule."""
 import re
 import subprocess
 import sys
@@ -17,9 +17,27 @@ LAYERS = {
     "solver/pairs": ["solver/core", "solver/scene"],
     "solver/effects": ["solver/core", "solver/scene", "solver/physics", "solver/pairs"],
     "solver/walls": ["solver/core", "solver/scene", "solver/pairs"],
-    "solver/kernels": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours", "solver/pairs", "solver/effects", "solver/walls"],
-    "solver/run": ["solver/core", "solver/scene", "solver/physics", "solver/neighbours", "solver/pairs", "solver/effects", "solver/walls",
-                   "solver/kernels", "decomposition", "perf"],
+    "solver/kernels": [
+        "solver/core",
+        "solver/scene",
+        "solver/physics",
+        "solver/neighbours",
+        "solver/pairs",
+        "solver/effects",
+        "solver/walls",
+    ],
+    "solver/run": [
+        "solver/core",
+        "solver/scene",
+        "solver/physics",
+        "solver/neighbours",
+        "solver/pairs",
+        "solver/effects",
+        "solver/walls",
+        "solver/kernels",
+        "decomposition",
+        "perf",
+    ],
     "decomposition": ["solver/core", "solver/scene"],
     "io": ["solver/core", "solver/scene"],
     "perf/bench": ["solver", "decomposition", "io", "perf"],
@@ -41,6 +59,12 @@ GENERATED = {"build", "results"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
+# A file of more lines than this says at its top why, in words that begin so.
+LONG, REASON = 420, "beyond 400 lines:"
+# Long without a reason; a file leaves this list as it is split, and none comes in.
+TO_SPLIT = {"solver/scene/check.cpp", "solver/scene/fill.cpp"}
+
+
 def inside(path, place):
     return path == place or path.startswith(place + "/")
 
@@ -57,7 +81,8 @@ def sources(root):
             if file.suffix in (".hpp", ".cpp", ".h", ".cc", ".hh", ".inl") and file.is_file():
                 lines = file.read_text(errors="replace").splitlines()
                 found[file.relative_to(root).as_posix()] = [
-                    (k, m[1] == '"', m[2]) for k, line in enumerate(lines, 1) if (m := INCLUDE.match(line))]
+                    (k, m[1] == '"', m[2]) for k, line in enumerate(lines, 1) if (m := INCLUDE.match(line))
+                ]
     return found
 
 
@@ -90,7 +115,7 @@ def violations(root, top_level):
                     yield f"{path}:{k}: includes {what}, which only {place} may"
             own = what in includes
             if quoted and not own:
-                yield f"{path}:{k}: \"{what}\" is no file of the project as seen from its root"
+                yield f'{path}:{k}: "{what}" is no file of the project as seen from its root'
             if own and not quoted:
                 yield f"{path}:{k}: <{what}> is the project's own: write it in quotes"
             if own and layer_of(what) != layer and not any(inside(what, allowed) for allowed in LAYERS[layer]):
@@ -101,6 +126,19 @@ def violations(root, top_level):
                     # Said where a file of that place is included from outside it, not again by everything above.
                     if chain and inside(what, place):
                         yield f"{path}:{k}: comes to {chain[-1]} through {' -> '.join(chain[:-1])}"
+
+
+def too_long(root, to_split):
+    for folder in sorted(FOLDERS):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix not in (".hpp", ".cpp", ".py", ".sh") or not file.is_file():
+                continue
+            path, lines = file.relative_to(root).as_posix(), file.read_text(errors="replace").splitlines()
+            good = len(lines) <= LONG or any(REASON in line.lower() for line in lines[:40])
+            if good and path in to_split:
+                yield f"{path}: no longer too long: take it from the list of this test"
+            if not good and path not in to_split:
+                yield f"{path}:{len(lines)}: longer than {LONG} lines: split it, or say at its top why it is one file: // Beyond 400 lines: ..."
 
 
 def top_level_folders(root):
@@ -144,7 +182,10 @@ PLANTED = {  # file, its text, what must be said of it ("" for nothing)
     "perf/greedy.hpp": ('#include "solver/core/simd.hpp"\n', "perf may not include solver/core/simd.hpp"),
     "perf/bench/rates.cpp": ('#include "solver/kernels/scheme.hpp"\n', ""),
     "solver/app/main.cpp": ('#include "perf/report.hpp"\n', ""),
-    "solver/app/cut.cpp": ('#include "decomposition/cut.hpp"\n', "comes to <mpi.h> through decomposition/cut.hpp -> decomposition/comm.hpp"),
+    "solver/app/cut.cpp": (
+        '#include "decomposition/cut.hpp"\n',
+        "comes to <mpi.h> through decomposition/cut.hpp -> decomposition/comm.hpp",
+    ),
     "solver/app/scene.cpp": ("#include <toml++/toml.h>\n", "which only io may"),
     "tests/unit/metis_test.cpp": ("#include <metis.h>\n", "includes metis.h"),
     "jobs/tool.cpp": ("#include <span>\n", "outside every layer"),
@@ -160,7 +201,12 @@ def check_the_check():
             (root / path).write_text(text)
         (root / "misc").mkdir()
         said = list(violations(root, {entry.name for entry in root.iterdir()}))
+        for name, top in (("long", ""), ("reason", "// Beyond 400 lines: one table.\n"), ("listed", "")):
+            (root / f"io/{name}.cpp").write_text(top + "\n" * LONG + "int x;\n")
+        long = [line.split(":")[0] for line in too_long(root, {"io/listed.cpp", "io/file.cpp"})]
     wrong = []
+    if long != ["io/file.cpp", "io/long.cpp"]:
+        wrong.append(f"self-check: the long files found are {long}")
     for path, (_, expected) in PLANTED.items():
         about = [line for line in said if re.match(re.escape(path) + ":", line)]
         if (not expected and about) or (expected and not any(expected in line for line in about)):
@@ -171,7 +217,7 @@ def check_the_check():
 
 
 def main():
-    wrong = check_the_check() or list(violations(ROOT, top_level_folders(ROOT)))
+    wrong = check_the_check() or [*violations(ROOT, top_level_folders(ROOT)), *too_long(ROOT, TO_SPLIT)]
     print("\n".join(wrong) if wrong else f"includes point one way in {len(sources(ROOT))} files")
     return 1 if wrong else 0
 

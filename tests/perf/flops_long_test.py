@@ -14,35 +14,23 @@ Lane-wise operations of the pairs, divided by entries and lanes, are what one pa
 Skipped (exit 0, said so) without valgrind or on instruction sets it cannot run."""
 import collections
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 
-SCENE = """title = "operations of a pair"
-dimensions = 3
-[space]
-spacing = 0.04
-h = 1.2
-[time]
-end = 1.0e-3
-step = 1.0e-4
-[soil.sand]
-density = 1850.0
-young = 1.8e6
-poisson = 0.3
-friction_angle = 25.0
-[[body]]
-soil = "sand"
-box = { low = [0.0, 0.0, 0.0], high = [0.32, 0.32, 0.32] }
-[effects]
-gravity = [0.0, 0.0, -9.81]
-viscosity = { alpha = 0.1, beta = 0.0 }
-[accuracy]
-kernel = "cubic spline"
-scheme = "leap-frog"
-"""
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import block, program
+
+SCENE = block(
+    floor=None,
+    title="operations of a pair",
+    end=1.0e-3,
+    effects="viscosity = { alpha = 0.1, beta = 0.0 }",
+    accuracy='kernel = "cubic spline"\nscheme = "leap-frog"',
+)
 # one operation a lane; a fused multiply-add is two
 ONE = re.compile(r"^v?(add|sub|mul|div|sqrt|max|min)(pd|sd)$")
 TWO = re.compile(r"^vf(n?)m(add|sub|addsub|subadd)\d*(pd|sd)$")
@@ -71,16 +59,33 @@ def executed(path):
 
 
 def main():
-    program = sys.argv[1]
     if not shutil.which("valgrind") or not shutil.which("objdump"):
         print("skipped: needs valgrind and objdump (jobs/install.sh tests)")
         return 0
     with tempfile.TemporaryDirectory(prefix="kuzure-flops-") as work:
         with open(work + "/s.toml", "w") as f:
             f.write(SCENE)
-        out = subprocess.run(["valgrind", "--tool=callgrind", "--dump-instr=yes", "--compress-pos=no", "--compress-strings=no",
-                              "--callgrind-out-file=" + work + "/cg", program, "run", work + "/s.toml", "-o", work + "/out", "--quiet",
-                              "--threads", "1"], capture_output=True, text=True, cwd=work)
+        out = subprocess.run(
+            [
+                "valgrind",
+                "--tool=callgrind",
+                "--dump-instr=yes",
+                "--compress-pos=no",
+                "--compress-strings=no",
+                "--callgrind-out-file=" + work + "/cg",
+                program,
+                "run",
+                work + "/s.toml",
+                "-o",
+                work + "/out",
+                "--quiet",
+                "--threads",
+                "1",
+            ],
+            capture_output=True,
+            text=True,
+            cwd=work,
+        )
         if out.returncode != 0:
             if "unhandled instruction" in out.stderr or "SIGILL" in out.stderr:
                 print("skipped: this valgrind does not know the instructions of this build")
@@ -133,4 +138,5 @@ def main():
     return 0 if good else 1
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

@@ -35,40 +35,49 @@ def counted(passes, how):
     """Instructions of the whole program, and the pairs of a pass."""
     out = subprocess.run(
         ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), str(passes), how],
-        capture_output=True, text=True, timeout=600, env={"OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"})
+        capture_output=True,
+        text=True,
+        timeout=600,
+        env={"OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"},
+    )
     if out.returncode != 0:
         sys.exit(f"valgrind or {program} failed ({out.returncode}):\n{out.stderr[-2000:]}")
     total = re.search(r"Collected : (\d+)", out.stderr)
     return int(total.group(1)), int(out.stdout)
 
 
-if shutil.which("valgrind") is None:
-    not_run("valgrind is not installed: jobs/install.sh tests")
-if "avx2" not in pathlib.Path("/proc/cpuinfo").read_text():
-    not_run("this processor has no AVX2")
-if not program.exists():
-    not_run(f"{program} was not built (benchmarks off, or not an optimised build)")
+def main():
+    if shutil.which("valgrind") is None:
+        not_run("valgrind is not installed: jobs/install.sh tests")
+    if "avx2" not in pathlib.Path("/proc/cpuinfo").read_text():
+        not_run("this processor has no AVX2")
+    if not program.exists():
+        not_run(f"{program} was not built (benchmarks off, or not an optimised build)")
 
-name = compiler()
-found = {}
-for how in ("lanes", "plain", "staggered"):
-    few, pairs = counted(5, how)
-    many, _ = counted(10, how)
-    found[how] = round((many - few) / 5 / pairs, 2)
-print(f"{name}: {found} instructions per directed pair")
+    name = compiler()
+    found = {}
+    for how in ("lanes", "plain", "staggered"):
+        few, pairs = counted(5, how)
+        many, _ = counted(10, how)
+        found[how] = round((many - few) / 5 / pairs, 2)
+    print(f"{name}: {found} instructions per directed pair")
 
-known = json.loads(stored.read_text())
-if "--update" in sys.argv:
-    known[name] = found
-    stored.write_text(json.dumps(known, indent=2) + "\n")
-    print(f"stored in {stored}")
-    sys.exit(0)
-if name not in known:
-    not_run(f"no count is stored for {name}; those of {', '.join(known) or 'no compiler'} are")
-wrong = []
-for how, count in found.items():
-    ratio = count / known[name][how]
-    print(f"{how}: {count}, stored {known[name][how]}, ratio {ratio:.4f}")
-    if abs(ratio - 1) > TOLERANCE:
-        wrong.append(f"{how}: {ratio:.3f} of the stored count")
-sys.exit("; ".join(wrong) or 0)
+    known = json.loads(stored.read_text())
+    if "--update" in sys.argv:
+        known[name] = found
+        stored.write_text(json.dumps(known, indent=2) + "\n")
+        print(f"stored in {stored}")
+        sys.exit(0)
+    if name not in known:
+        not_run(f"no count is stored for {name}; those of {', '.join(known) or 'no compiler'} are")
+    wrong = []
+    for how, count in found.items():
+        ratio = count / known[name][how]
+        print(f"{how}: {count}, stored {known[name][how]}, ratio {ratio:.4f}")
+        if abs(ratio - 1) > TOLERANCE:
+            wrong.append(f"{how}: {ratio:.3f} of the stored count")
+    sys.exit("; ".join(wrong) or 0)
+
+
+if __name__ == "__main__":
+    main()

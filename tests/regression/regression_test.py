@@ -6,20 +6,20 @@ Where the instruction set is stored, hash and energies must be equal to the last
 compared with, which is said, and the energies must agree with those of a stored set within 1e-6 of the run's largest.
 
 --update stores what the program gives now. A change of bits comes in a commit of its own that says why they change."""
-import csv, json, os, re, shutil, subprocess, sys, tempfile
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
 
-program = os.path.abspath(sys.argv[1])
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, scratch
+
 here = os.path.dirname(os.path.abspath(__file__))
 stored = os.path.join(here, "reference.json")
 ENERGIES = ("kinetic", "potential", "elastic", "plastic", "viscous", "wall", "damping")
 TOLERANCE = 1e-6
-failures = 0
-
-
-def check(good, what):
-    global failures
-    print(("ok    " if good else "FAIL  ") + what, flush=True)
-    failures += not good
 
 
 def results(work, name, *more):
@@ -30,8 +30,11 @@ def results(work, name, *more):
         summary = json.load(f)
     with open(os.path.join(out, "history.csv")) as f:
         rows = [r for r in csv.DictReader(f) if not r["time"].startswith("#")]
-    return {"state_hash": summary["state_hash"], "steps": summary["steps"],
-            "energies": {"time": [float(r["time"]) for r in rows], **{e: [float(r[e]) for r in rows] for e in ENERGIES}}}
+    return {
+        "state_hash": summary["state_hash"],
+        "steps": summary["steps"],
+        "energies": {"time": [float(r["time"]) for r in rows], **{e: [float(r[e]) for r in rows] for e in ENERGIES}},
+    }
 
 
 def apart(a, b):
@@ -42,13 +45,13 @@ def apart(a, b):
     return max(abs(x - y) for e in ENERGIES for x, y in zip(a[e], b[e])) / largest
 
 
-version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
-name_of_set = re.search(r"GCC [^,]*, ([^,]*), OpenMP", version)
-check(name_of_set is not None, f"the instruction set stands in the version: {version.strip()}")
-instruction_set = name_of_set[1] if name_of_set else "unknown"
-reference = json.load(open(stored)) if os.path.exists(stored) else {}
-work = tempfile.mkdtemp(prefix="kuzure-regression-")
-try:
+def main():
+    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    name_of_set = re.search(r"GCC [^,]*, ([^,]*), OpenMP", version)
+    check(name_of_set is not None, f"the instruction set stands in the version: {version.strip()}")
+    instruction_set = name_of_set[1] if name_of_set else "unknown"
+    reference = json.load(open(stored)) if os.path.exists(stored) else {}
+    work = scratch("regression")
     scenes = sorted(f[:-5] for f in os.listdir(here) if f.endswith(".toml"))
     check(len(scenes) >= 4, f"{len(scenes)} scenes")
     now = {scene: results(work, scene) for scene in scenes}
@@ -61,8 +64,10 @@ try:
         sys.exit(0)
     known = reference.get(instruction_set)
     if known is None:
-        print(f"the hashes of {instruction_set} are not stored (stored: {', '.join(reference) or 'none'}): energies are compared to {TOLERANCE:g}; "
-              "store them by --update")
+        print(
+            f"the hashes of {instruction_set} are not stored (stored: {', '.join(reference) or 'none'}): energies are compared to {TOLERANCE:g}; "
+            "store them by --update"
+        )
     check(bool(reference), "something is stored")
     for scene, got in now.items():
         for other, kept in reference.items():
@@ -71,16 +76,21 @@ try:
                 continue
             difference = apart(got["energies"], kept[scene]["energies"])
             if other == instruction_set:
-                check(got["state_hash"] == kept[scene]["state_hash"],
-                      f"{scene}: state_hash {got['state_hash']}, stored {kept[scene]['state_hash']} (energies differ by {difference:.2g})")
+                check(
+                    got["state_hash"] == kept[scene]["state_hash"],
+                    f"{scene}: state_hash {got['state_hash']}, stored {kept[scene]['state_hash']} (energies differ by {difference:.2g})",
+                )
                 check(difference == 0, f"{scene}: the energies of history.csv are those stored, to the bit ({difference:.2g})")
             elif known is None:
                 check(difference < TOLERANCE, f"{scene}: energies differ by {difference:.2g} from those of {other}, allowed {TOLERANCE:g}")
     # The comparison must be able to fail: a slightly other soil is another result.
     changed = results(work, "dry_3d", "--set", "soil.sand.young=1.801e6")
-    check(changed["state_hash"] != now["dry_3d"]["state_hash"] and apart(changed["energies"], now["dry_3d"]["energies"]) > TOLERANCE,
-          "another Young's modulus gives another hash and other energies")
-finally:
-    shutil.rmtree(work, ignore_errors=True)
-print(f"{failures} failures")
-sys.exit(1 if failures else 0)
+    check(
+        changed["state_hash"] != now["dry_3d"]["state_hash"] and apart(changed["energies"], now["dry_3d"]["energies"]) > TOLERANCE,
+        "another Young's modulus gives another hash and other energies",
+    )
+    finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -139,7 +139,7 @@ double slid_apart(double spacing, double slip, double speed, double half)
 
 } // namespace
 
-TEST(H7, CornerWedgeAndThinWall)
+TEST(Flow, CornerWedgeAndThinWall)
 {
     Case c("H7");
     const auto w = wedge(0, 4, mild);
@@ -177,7 +177,7 @@ TEST(H7, CornerWedgeAndThinWall)
                            broken.outcome.held() && broken.depth <= 0.5 && broken.outside == 0));
 }
 
-TEST(H8, TallColumns)
+TEST(Flow, TallColumns)
 {
     Case c("H8");
     std::array<Tall, 2> r;
@@ -198,7 +198,7 @@ TEST(H8, TallColumns)
                            bare.outcome.held() && bare.lost == 0 && bare.energy <= 0.02));
 }
 
-TEST(H9, ThinLayerOnAnIncline)
+TEST(Flow, ThinLayerOnAnIncline)
 {
     Case c("H9");
     const double phi = 20, tangent = std::sin(phi * pi / 180); // of the plane of shear, no dilation
@@ -217,7 +217,7 @@ TEST(H9, ThinLayerOnAnIncline)
                            layer(4, "surface = { friction_angle = 18.0 }", std::tan(15 * pi / 180), 30), "1", 0.1));
 }
 
-TEST(H13, HeapAtRest)
+TEST(Flow, HeapAtRest)
 {
     Case c("H13");
     struct Kernel {
@@ -236,7 +236,7 @@ TEST(H13, HeapAtRest)
         c.control("factor of safety 0.9: drift", steep.drift, "dx", "<= 0.1, KE/PE0 <= 1e-8", steep.drift <= 0.1 && steep.kinetic <= 1e-8));
 }
 
-TEST(H17, SofteningAndSpacing)
+TEST(Flow, SofteningAndSpacing)
 {
     Case c("H17");
     // One band, from the work of its strength: rho H v^2/4 = (c + c_r)/2 s + c_r (way - s).

@@ -87,7 +87,7 @@ Column column(double poisson, const std::string& effects, double jitter, const c
 
 } // namespace
 
-TEST(H2, NoiseOfTheStress)
+TEST(Noise, NoiseOfTheStress)
 {
     Case c("H2");
     const auto with = collapse_noise(diffusion), without = collapse_noise("");
@@ -108,7 +108,7 @@ TEST(H2, NoiseOfTheStress)
     EXPECT_TRUE(c.at_most("settled column, zeta = 0.1: N of the mean stress", still.noise, "1", 0.02));
 }
 
-TEST(H5, NearlyIncompressibleColumn)
+TEST(Noise, NearlyIncompressibleColumn)
 {
     Case c("H5");
     const auto cured = column(0.49, settling + mild + diffusion, 0, "none", 30);
@@ -119,7 +119,7 @@ TEST(H5, NearlyIncompressibleColumn)
                            "<= 0.05, N <= 0.05", bare.p <= 0.05 && bare.noise <= 0.05));
 }
 
-TEST(H15, IrregularStart)
+TEST(Noise, IrregularStart)
 {
     Case c("H15");
     const std::string unequal = "all particles have the same mass and volume: sum of V grad W is not zero; the cure (volumes of a Voronoi "
@@ -138,7 +138,7 @@ TEST(H15, IrregularStart)
         c.control_at_most("jitter 0.3 dx, no stress at the start: greatest kinetic over potential energy", shocked.kinetic, "1", 1e-4));
 }
 
-TEST(H16, LayersOfStiffnessAndDensity)
+TEST(Noise, LayersOfStiffnessAndDensity)
 {
     Case c("H16");
     const double dx = 0.05, width = 8 * dx;

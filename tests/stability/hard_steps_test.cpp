@@ -133,7 +133,7 @@ Impact impact(double alpha, double beta, double mach = 0.3)
 
 } // namespace
 
-TEST(H6, LongStepsAreStableOrDetected)
+TEST(Steps, LongStepsAreStableOrDetected)
 {
     Case c("H6");
     const std::string one_pass = "\nscheme = \"leap-frog\"";
@@ -177,7 +177,7 @@ TEST(H6, LongStepsAreStableOrDetected)
 }
 
 // The same of the staggered scheme: stable to dt c_p/h = 1.8 in theory.
-TEST(H6, LongStaggeredStepsAreStableOrDetected)
+TEST(Steps, LongStaggeredStepsAreStableOrDetected)
 {
     Case c("H6");
     for (const double courant : {0.5, 1.0, 1.4, 3.0}) {
@@ -197,7 +197,7 @@ TEST(H6, LongStaggeredStepsAreStableOrDetected)
     }
 }
 
-TEST(H10, FastImpactDoesNotPierce)
+TEST(Steps, FastImpactDoesNotPierce)
 {
     Case c("H10");
     const auto r = impact(1, 2);
@@ -234,7 +234,7 @@ TEST(H10, FastImpactDoesNotPierce)
                            bare.outcome.held() && bare.depth <= 1 && bare.energy <= 0.02));
 }
 
-TEST(H11, TenTurnsOfAStressedDisc)
+TEST(Steps, TenTurnsOfAStressedDisc)
 {
     Case c("H11");
     const auto corrected = turn(10, "gradient");
@@ -247,7 +247,7 @@ TEST(H11, TenTurnsOfAStressedDisc)
     EXPECT_FALSE(c.control_at_most("2 turns, no correction: drift of the stress eigenvalues", plain.stress_drift, "1", 0.01));
 }
 
-TEST(H12, CheckerboardDies)
+TEST(Steps, CheckerboardDies)
 {
     Case c("H12");
     struct Kernel {
@@ -265,7 +265,7 @@ TEST(H12, CheckerboardDies)
     EXPECT_FALSE(c.control_at_most("checkerboard energy left after 20 dx/c_p, alpha = 0", checkerboard(0, "cubic spline", 1.2), "1", 0.1));
 }
 
-TEST(H18, MapCoordinates)
+TEST(Steps, MapCoordinates)
 {
     Case c("H18");
     const double far = 5e6;
@@ -298,7 +298,7 @@ TEST(H18, MapCoordinates)
                            std::fabs(kept - 0.01) / 0.01 <= 1e-6));
 }
 
-TEST(H20, ResumedRunsAreTheSameBits)
+TEST(Steps, ResumedRunsAreTheSameBits)
 {
     Case c("H20");
     const auto t = collapse(0.04, 0.4, 0.6, 0.4);

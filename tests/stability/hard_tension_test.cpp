@@ -79,7 +79,7 @@ Flight fly(const std::string& strength, double rate = 20)
 
 } // namespace
 
-TEST(H1, RingsReboundWhole)
+TEST(Tension, RingsReboundWhole)
 {
     Case c("H1");
     const double dx = 0.01 / 6, end = 4.0e-4;
@@ -92,7 +92,7 @@ TEST(H1, RingsReboundWhole)
                            without.pieces <= 2 && without.clumped <= 1e-3));
 }
 
-TEST(H1, CohesiveBlockFailsInOnePiece)
+TEST(Tension, CohesiveBlockFailsInOnePiece)
 {
     Case c("H1");
     const auto with = cohesive_block(0.5), doubled = cohesive_block(1);
@@ -112,7 +112,7 @@ TEST(H1, CohesiveBlockFailsInOnePiece)
                            without.outcome.held() && without.pieces == 1 && without.clumped <= 1e-3));
 }
 
-TEST(H3, TipOfTheConeGivesNoNaN)
+TEST(Tension, TipOfTheConeGivesNoNaN)
 {
     Case c("H3");
     constexpr int traps = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW;
@@ -140,7 +140,7 @@ TEST(H3, TipOfTheConeGivesNoNaN)
                            std::isfinite(rate) && !std::fetestexcept(traps)));
 }
 
-TEST(H4, FlyingGrainsFallFreely)
+TEST(Tension, FlyingGrainsFallFreely)
 {
     Case c("H4");
     const auto dry = fly("friction_angle = 25.0\ncone = \"plane strain\"");
@@ -151,7 +151,7 @@ TEST(H4, FlyingGrainsFallFreely)
     EXPECT_FALSE(c.control_at_most("elastic in tension: stress left in them over rho c_p^2", bound.stress, "1", 0));
 }
 
-TEST(H14, LoneParticlesDoNoHarm)
+TEST(Tension, LoneParticlesDoNoHarm)
 {
     Case c("H14");
     const double dx = 0.04;

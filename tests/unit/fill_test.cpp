@@ -1,4 +1,5 @@
 // The particles of a scene against brute force over the lattice, and regions that must add up to the whole.
+// Beyond 400 lines: one test a shape and a rule of filling.
 #include "io/scene_file.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/fill.hpp"

@@ -1,4 +1,5 @@
 // Pictures of one run share camera and colours, show the soil where it is, in the colours promised, and come from snapshots.
+// Beyond 400 lines: one test a promise of the pictures.
 #include "io/picture_series.hpp"
 #include "io/snapshot.hpp"
 #include "io/soil_color.hpp"

@@ -1,5 +1,6 @@
 // Both stages of every compiled staggered model against solver/kernels/staggered_by_the_book.hpp: in 3-D and 2-D, plain, in lanes and in
 // mixed precision, far from walls and beside walls of every shape and surface, corners, seams and images across a period.
+// Beyond 400 lines: one comparison, on every kind of wall.
 #include "solver/kernels/staggered_by_the_book.hpp"
 #include "tests/unit/clouds.hpp"
 #include "tests/unit/run_staggered.hpp"
@@ -77,7 +78,7 @@ struct Read {
     std::vector<book::Strain> strain;
     std::vector<book::Strained> strained;
     std::vector<book::Forced> forced;
-    int contacts[5] = {};
+    int contacts[6] = {};
 };
 struct Steps {
     double dt, next; // s
@@ -153,7 +154,8 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         read.strain.push_back(book::strain_of(i, ground_soil, kept[i], points, setting, planted.at_end_of_step ? 0 : dt));
         read.strained.push_back(book::strained(particle, c.soils[std::size_t(soil[i])], kept[i], read.strain.back(), setting, dt));
         book::Kept forced = kept[i];
-        forced.acceleration = book::strain_of(i, ground_soil, kept[i], points, setting, 0).viscous;
+        const auto before = book::strain_of(i, ground_soil, kept[i], points, setting, 0);
+        forced.acceleration = before.viscous, forced.counted = before.counted, forced.rubbing = before.rubbing;
         read.forced.push_back(book::force_on(i, ground_soil, forced, points, setting, dt, next));
         ++read.contacts[int(read.forced.back().contact)];
     }
@@ -311,7 +313,7 @@ TEST(StaggeredByTheBook, EveryModelFarFromWalls)
 
 TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
 {
-    int contacts[5] = {}, arrangement = 0;
+    int contacts[6] = {}, arrangement = 0;
     const auto hold = [&](const Scene& s, const std::string& what) {
         auto arranged = Arrangement(arrangement++ % 6); // another one for each wall and model
         // on a lattice particles lie in the planes of a step's edge, in front of which they may be or not by their last digits
@@ -322,7 +324,7 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
         EXPECT_GT(clear, 0) << what;
         EXPECT_LT(clear, c.particles.size() - 10) << what;
         expect_by_the_book(c, read, what + ", " + arrangements[arranged]);
-        for (int k = 0; k < 5; ++k) contacts[k] += read.contacts[k];
+        for (int k = 0; k < 6; ++k) contacts[k] += read.contacts[k];
     };
     for (const Scene& bare : scenes(staggered)) {
         Scene s = bare;
@@ -344,8 +346,8 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
         hold(s, "corner");
     }
     // every branch of Coulomb's law has been taken
-    for (const auto contact :
-         {book::Forced::Contact::Sticks, book::Forced::Contact::Slides, book::Forced::Contact::Approached, book::Forced::Contact::LetGo})
+    for (const auto contact : {book::Forced::Contact::Sticks, book::Forced::Contact::Slides, book::Forced::Contact::Approached,
+                               book::Forced::Contact::PulledOff, book::Forced::Contact::LetGo})
         EXPECT_GT(contacts[int(contact)], 50) << int(contact);
 }
 

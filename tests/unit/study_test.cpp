@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <set>
 
 using namespace kuzure;
@@ -343,6 +344,22 @@ TEST(Dial, ProposesTheCheapestThatReachesTheError)
     EXPECT_GE(distance(likeness(block(0.1)), read_measured(table_text)[0].about, &why), 1);
     EXPECT_THAT(why, HasSubstr("2-D, not 3-D"));
     EXPECT_THROW(propose(scene, 0.05, {}, cost), BadInput);
+}
+// What a study writes about its scene is what the dial compares scenes by, in the same units: a scene is no distance from itself.
+TEST(Dial, TakesAScenesOwnStudyForItsLike)
+{
+    Study study;
+    study.points.emplace_back();
+    auto& p = study.points.back();
+    p.scene = block(0.1);
+    p.scene->soils[0].cohesion = 5e3; // Pa; the weight of the height is 14.5 kPa
+    p.spacing = 0.1;
+    const auto about = to_json(study)["about"];
+    EXPECT_NEAR(about["cohesion"].get<double>(), 5e3 / (1850 * 9.81 * 0.8), 1e-9);
+    EXPECT_NEAR(about["height"].get<double>(), 0.8, 1e-9);
+    const std::string curve = fmt::format(
+        R"([{{"scene": "own", "measure": "profile", "preset": "fast", "about": {}, "points": [[8, 0.2], [16, 0.1]]}}])", about.dump());
+    EXPECT_NEAR(distance(likeness(*p.scene), read_measured(curve)[0].about), 0, 1e-9);
 }
 TEST(Dial, AStepIsPricedByThePassesOfItsScheme)
 {

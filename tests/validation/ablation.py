@@ -5,35 +5,44 @@ column: aluminium bars, 4 mm (V-EXP-1); block: cohesive, 80 mm (V-EXP-5); slope:
 Cost: shortened runs, interleaved without, with, without, with, ...; the ratio of the medians of seconds_per_step.
 Change: one full run each. Effects whose keys this build refuses are skipped with a note.
 """
-import hashlib, os, statistics, sys
+import hashlib
+import os
+import statistics
+import sys
 
 import numpy as np
 
-import v_exp_1, v_exp_4, v_exp_5
+import aluminium_bars
+import slope_safety
+import cohesive_block
 from common import RESULTS, Case, RunFailed, accepted, changed, run, stress_noise, toml
 
 COLUMN_DX, BLOCK_DX, SLOPE_DX = 0.004, 0.08, 0.5
 
 
 def column(result):
-    m = v_exp_1.measure(result, 4)
-    return {"x at 5 mm (mm)": m["toe"], "height at 100 mm (mm)": float(np.interp(100.0, m["at"], m["height"])), "stress noise": stress_noise(result.snapshot(1), COLUMN_DX, 2650.0)}
+    m = aluminium_bars.measure(result, 4)
+    return {
+        "x at 5 mm (mm)": m["toe"],
+        "height at 100 mm (mm)": float(np.interp(100.0, m["at"], m["height"])),
+        "stress noise": stress_noise(result.snapshot(1), COLUMN_DX, 2650.0),
+    }
 
 
 def block(result):
-    m = v_exp_5.measure(result, BLOCK_DX)
+    m = cohesive_block.measure(result, BLOCK_DX)
     return {"crest drop (m)": m["drop"], "clumped (%)": m["clumped"], "stress noise": stress_noise(result.snapshot(), BLOCK_DX, 1850.0)}
 
 
 def slope(result):
-    m = v_exp_4.measure(result)
+    m = slope_safety.measure(result)
     return {"moved since release (mm)": 1e3 * m["end"], "stress noise": stress_noise(result.snapshot(), SLOPE_DX, 2039.0)}
 
 
 SCENES = {
-    "column": (v_exp_1.scene(4, **{"output.every": 0.2}), column),
-    "block": (v_exp_5.scene(0.5, BLOCK_DX), block),
-    "slope": (v_exp_4.scene(1.0, "plane strain, no dilation", 20, **{"output.fields": None}), slope),
+    "column": (aluminium_bars.scene(4, **{"output.every": 0.2}), column),
+    "block": (cohesive_block.scene(0.5, BLOCK_DX), block),
+    "slope": (slope_safety.scene(1.0, "plane strain, no dilation", 20, **{"output.fields": None}), slope),
 }
 
 # Effect: {scene: (changes that leave it out, changes that put it in)}. Changes are relative to the scene as it stands.
@@ -85,9 +94,20 @@ def compare(case, effect, scene_name, without, having, measure):
             times[which].append(seconds_per_step(scene, f"time-{tag}-{which}"))
     cost = 100 * (statistics.median(times["with"]) / statistics.median(times["without"]) - 1)
     (off, why_off), (on, why_on) = answers(without, measure, scene_name), answers(having, measure, scene_name)
-    parts = [f"{k} {off.get(k, np.nan):.4g} without, {on.get(k, np.nan):.4g} with" for k in dict(off, **on)] + [w for w in (why_off, why_on) if w]
-    case.record(f"{effect}, {scene_name}: cost of a step", "", cost, "%", seconds=sum(times["with"]) + sum(times["without"]), note="; ".join(parts))
-    return {"effect": effect, "scene": scene_name, "cost": cost, "without": off, "with": on, "note": "; ".join(w for w in (why_off, why_on) if w)}
+    parts = [f"{k} {off.get(k, np.nan):.4g} without, {on.get(k, np.nan):.4g} with" for k in dict(off, **on)] + [
+        w for w in (why_off, why_on) if w
+    ]
+    case.record(
+        f"{effect}, {scene_name}: cost of a step", "", cost, "%", seconds=sum(times["with"]) + sum(times["without"]), note="; ".join(parts)
+    )
+    return {
+        "effect": effect,
+        "scene": scene_name,
+        "cost": cost,
+        "without": off,
+        "with": on,
+        "note": "; ".join(w for w in (why_off, why_on) if w),
+    }
 
 
 def table(rows, skipped):
@@ -111,7 +131,9 @@ def main(quick=False, slow=False):
             without, having = changed(base, leave_out), changed(base, put_in)
             good, why = accepted(having)
             if not good:
-                case.record(f"{effect}, {scene_name}", "", "skipped", "", note=why.splitlines()[-1][-160:] if why else "refused by kuzure check")
+                case.record(
+                    f"{effect}, {scene_name}", "", "skipped", "", note=why.splitlines()[-1][-160:] if why else "refused by kuzure check"
+                )
                 if effect not in skipped:
                     skipped.append(effect)
                 continue

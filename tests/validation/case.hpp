@@ -4,6 +4,7 @@
 // Every measured quantity becomes one JSON line in $KUZURE_RESULTS/<case>.jsonl, every curve a table in
 // $KUZURE_RESULTS/<case>_<name>.csv; without the variable nothing is written. A criterion that the solver does not meet
 // stays in the record as failed; the test then asserts the bound that it does meet, so that a change for the worse shows.
+// Momenta, energies and norms are those of all ranks; one rank alone keeps a record.
 #include "io/scene_file.hpp"
 #include "solver/run/simulation.hpp"
 #include "tests/mpi/world.hpp"
@@ -77,7 +78,7 @@ inline std::string periodic(double width, double low, double high, const char* a
     return fmt::format("low = [0.0, 0.0, {}]\nhigh = [{}, {}, {}]\nperiodic = [{}]", low, width, width, high, axes);
 }
 
-// ---- initial fields, on all of a field's twins that the scheme has ----
+// ---- initial fields, on a field's half-step copy too where the scheme has one ----
 
 inline void set_velocity(Particles& p, Index i, Vector v)
 {
@@ -143,18 +144,25 @@ inline double mechanical_energy(const Simulation& s)
     return l.state.kinetic + l.state.elastic;
 }
 inline Vector cross(Vector a, Vector b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+/// The sum over all ranks.
+inline Vector over_ranks(Vector part)
+{
+    double sums[3] = {part.x, part.y, part.z};
+    world().sum(std::span<double>(sums));
+    return {sums[0], sums[1], sums[2]};
+}
 inline Vector linear_momentum(const Simulation& s)
 {
     Vector sum;
     each(s, [&](Index i) { sum = fma(particle_mass(s, i), velocity(s, i), sum); });
-    return sum;
+    return over_ranks(sum);
 }
 /// About the origin.
 inline Vector angular_momentum(const Simulation& s)
 {
     Vector sum;
     each(s, [&](Index i) { sum = fma(particle_mass(s, i), cross(position(s, i), velocity(s, i)), sum); });
-    return sum;
+    return over_ranks(sum);
 }
 /// The smallest distance of two particles, m; for a few thousand of them.
 inline double least_distance(const Simulation& s)
@@ -200,8 +208,8 @@ public:
         e2_ += e * e, r2_ += reference * reference;
         e_ = std::max(e_, std::fabs(e)), r_ = std::max(r_, std::fabs(reference));
     }
-    double L2() const { return std::sqrt(e2_ / r2_); }
-    double Linf() const { return e_ / r_; }
+    double L2() const { return std::sqrt(world().sum(e2_) / world().sum(r2_)); }
+    double Linf() const { return world().max(e_) / world().max(r_); }
 
 private:
     double e2_ = 0, r2_ = 0, e_ = 0, r_ = 0;
@@ -317,7 +325,7 @@ private:
     std::string file(const std::string& ending) const
     {
         const char* directory = std::getenv("KUZURE_RESULTS");
-        return directory && *directory ? std::string(directory) + "/" + name_ + ending : std::string();
+        return world().size() == 1 && directory && *directory ? std::string(directory) + "/" + name_ + ending : std::string();
     }
     /// One JSON line; `reference` is JSON already. Seconds count from the result before.
     void record(const std::string& what, const std::string& reference, double result, const std::string& unit, const std::string& tolerance,
@@ -325,8 +333,9 @@ private:
     {
         const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
         begin_ = Clock::now();
-        fmt::print("[{:>8}] {}: {} = {:.6g} {} (reference {}, {}) {:.2f} s{}{}\n", passed ? "met" : "NOT MET", name_, what, result, unit,
-                   reference, tolerance, seconds, note.empty() ? "" : "; ", note);
+        if (world().rank() == 0)
+            fmt::print("[{:>8}] {}: {} = {:.6g} {} (reference {}, {}) {:.2f} s{}{}\n", passed ? "met" : "NOT MET", name_, what, result,
+                       unit, reference, tolerance, seconds, note.empty() ? "" : "; ", note);
         const auto path = file(".jsonl");
         if (path.empty()) return;
         const std::string number = std::isfinite(result) ? fmt::format("{:.9g}", result) : "null";

@@ -136,6 +136,28 @@ TEST(Columns, SettleToTheirWeight)
     EXPECT_FALSE(c.control_at_most("L2 of sigma_zz, 50 spacings, undamped", settle(50, "", "none").L2, "1", 0.02));
 }
 
+// Still water carries its part: effective stress is (rho g - gamma_w) times the depth, and a column at rest stays there.
+TEST(Columns, SubmergedOnesRestOnTheirBuoyantWeight)
+{
+    for (const bool wet : {true, false}) {
+        SceneText t;
+        t.dimensions = 3, t.spacing = 0.04, t.end = 0.1, t.time = "step = 1.0e-4", t.strength = "friction_angle = 25.0";
+        t.space = periodic(0.24, -1, 3, "\"x\", \"y\"");
+        t.bodies = box("body", {0, 0, 0}, {0.24, 0.24, 0.8}, "soil = \"s\"\nstress = \"at rest\"");
+        t.walls = box("wall", {0, 0, -0.16}, {0.24, 0.24, 0}, "");
+        t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.1, beta = 0.0 }";
+        if (wet) t.effects += "\npore_pressure = { table = [[0.0, 2.0]] }";
+        Simulation sim(Comm::world(), t.scene());
+        double fastest = 0;
+        while (!sim.finished()) sim.step(), fastest = std::max(fastest, sim.max_speed());
+        const double weight = wet ? t.density * gravity - 9810 : t.density * gravity;
+        ErrorNorms norms;
+        each(sim, [&](Index i) { norms.add(stress(sim, i).zz, -weight * (0.8 - position(sim, i).z)); });
+        EXPECT_LT(norms.L2(), 0.05) << (wet ? "wet" : "dry");
+        EXPECT_LT(fastest, 0.03) << "m/s, of 4 m/s in free fall";
+    }
+}
+
 // What stands between a floor, two sides and a ramp: hydrostatic everywhere, the corners too.
 TEST(Columns, BasinWithARampIsHydrostatic)
 {

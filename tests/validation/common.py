@@ -4,7 +4,12 @@ Environment: KUZURE (program; default build/release/kuzure), KUZURE_RESULTS (rec
 results/validation), KUZURE_FIGURES (default $KUZURE_RESULTS/figures), KUZURE_THREADS (default 1).
 Only numpy, h5py and the gnuplot program are needed, all from Debian.
 """
-import copy, hashlib, json, os, shutil, subprocess
+import copy
+import hashlib
+import json
+import os
+import shutil
+import subprocess
 
 import h5py
 import numpy as np
@@ -152,7 +157,10 @@ def run(scene, case, name, minutes=8.0, fresh=False):
     with open(stamp, "w") as f:
         f.write(key)
     result = Run(out)
-    print(f"  {case}/{name}: {result.summary['soil_particles']} particles, {result.summary['steps']} steps, {result.seconds:.1f} s", flush=True)
+    print(
+        f"  {case}/{name}: {result.summary['soil_particles']} particles, {result.summary['steps']} steps, {result.seconds:.1f} s",
+        flush=True,
+    )
     return result
 
 
@@ -260,8 +268,18 @@ class Case:
         """passed None: a number for information, no gate."""
         if isinstance(result, (float, np.floating)):
             result = float(f"{float(result):.5g}") if np.isfinite(result) else None
-        row = {"case": self.name, "what": what, "reference": reference, "result": result, "unit": unit, "tolerance": tolerance,
-               "passed": None if passed is None else bool(passed), "seconds": round(float(seconds), 2), "note": note, "figure": figure}
+        row = {
+            "case": self.name,
+            "what": what,
+            "reference": reference,
+            "result": result,
+            "unit": unit,
+            "tolerance": tolerance,
+            "passed": None if passed is None else bool(passed),
+            "seconds": round(float(seconds), 2),
+            "note": note,
+            "figure": figure,
+        }
         with open(self.file, "a") as f:
             f.write(json.dumps(row) + "\n")
         mark = {None: "      ", True: "ok    ", False: "FAIL  "}[row["passed"]]

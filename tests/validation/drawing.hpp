@@ -4,6 +4,7 @@
 //
 // Ground is either a profile in x-z (slopes, steps, flats; drawn out along y in 3-D) or a heap of bricks on the lattice. Soil is placed by
 // the test: its bodies are boxes far from any ground that only say how many particles there are.
+// Beyond 400 lines: the generator of ground and what is asked of it belong together.
 #include "solver/scene/check.hpp"
 #include "tests/validation/case.hpp"
 #include <random>

@@ -4,4 +4,10 @@ import sys
 
 import validate
 
-sys.exit(validate.main(["--known", sys.argv[1]]))
+
+def main():
+    sys.exit(validate.main(["--known", sys.argv[1]]))
+
+
+if __name__ == "__main__":
+    main()

@@ -5,7 +5,10 @@ the markers keeps what stands around them.
 Any test may write records, in any language: one JSON object a line with the keys case, what, reference, result, unit,
 tolerance, passed (true, false or null for a number without a gate), seconds, note and, if it likes, figure.
 """
-import glob, json, os, sys
+import glob
+import json
+import os
+import sys
 
 from common import COLOURS, FIGURES, RESULTS, figure
 from known import MISSES
@@ -72,8 +75,11 @@ def render(page, cases):
     text = [f"{len(gates)} gates, {len(gates) - len(missed)} met, {len(missed)} missed; {sum(len(c) for c in cases.values())} rows.", ""]
     if missed:
         text += ["| code | missed gate | reference, tolerance | result | why |", "|---|---|---|---|---|"]
-        text += [f"| {r['case']} | {cell(r['what'])} | {quantity(r)}, {cell(r['tolerance'])} | {number(r['result'])} | "
-                 f"{cell(MISSES.get((r['case'], r['what'])) or r.get('note') or 'not understood yet')} |" for r in missed]
+        text += [
+            f"| {r['case']} | {cell(r['what'])} | {quantity(r)}, {cell(r['tolerance'])} | {number(r['result'])} | "
+            f"{cell(MISSES.get((r['case'], r['what'])) or r.get('note') or 'not understood yet')} |"
+            for r in missed
+        ]
         text.append("")
     text += ["| code | what | reference | result | unit | tolerance | pass | s | note |", "|---|---|---|---|---|---|---|---|---|"]
     more, figures = [], []
@@ -88,8 +94,10 @@ def render(page, cases):
             more.append(about)
         for r in content.values():
             verdict = {None: "", True: "yes", False: "**missed**"}[r["passed"]]
-            text.append(f"| {name} | {cell(r['what'])} | {cell(number(r['reference']))} | {cell(number(r['result']))} | {cell(r['unit'])} | {cell(r['tolerance'])} | "
-                        f"{verdict} | {r.get('seconds') or 0:.3g} | {cell(r.get('note', ''))} |")
+            text.append(
+                f"| {name} | {cell(r['what'])} | {cell(number(r['reference']))} | {cell(number(r['result']))} | {cell(r['unit'])} | {cell(r['tolerance'])} | "
+                f"{verdict} | {r.get('seconds') or 0:.3g} | {cell(r.get('note', ''))} |"
+            )
         for figure in sorted({r["figure"] for r in content.values() if r.get("figure")}):
             if os.path.exists(os.path.join(FIGURES, figure)):
                 figures.append(f"![{name}]({os.path.join(folder, figure)})\n")
@@ -112,24 +120,32 @@ def draw_closed_forms():
     drawn = {}
     column = os.path.join(RESULTS, "SPH-7_stress.csv")
     if os.path.exists(column):
-        drawn["SPH-7"] = figure("sph_7_column", f"""set xlabel 'stress (kPa)'; set ylabel 'height (m)'; set key left top
-set title 'SPH-7: elastic column at rest, 10 and 50 spacings'
+        drawn["SPH-7"] = figure(
+            "column_at_rest",
+            f"""set xlabel 'stress (kPa)'; set ylabel 'height (m)'; set key left top
+set title 'elastic column at rest, 10 and 50 spacings'
 plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' title 'closed form, -rho g d', \\
   '' every ::1 using ($1==10?$3/1e3:NaN):2 pt 7 ps 1.0 lc rgb '{COLOURS[1]}' title 'sigma_z, 10 spacings', \\
   '' every ::1 using ($1==50?$3/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[0]}' title 'sigma_z, 50 spacings', \\
   '' every ::1 using ($1==50?$4/1e3:NaN):2 pt 7 ps 0.5 lc rgb '{COLOURS[2]}' title 'sigma_x, 50 spacings'
-""")
+""",
+        )
     tips = {}
     for path in sorted(glob.glob(os.path.join(RESULTS, "SPH-5*_tip_*_0.05_0.3*.csv"))):
         tips[int(os.path.basename(path).split("_tip_")[1].split("_")[0]), "corrected" in path] = path
     if tips:
-        lines = ", ".join(f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 lc rgb '{COLOURS[k]}' title 'H/dx = {n}{', corrected gradient' if c else ''}'"
-                          for k, ((n, c), p) in enumerate(sorted(tips.items())))
-        drawn["SPH-5"] = figure("sph_5_plate", f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key center bottom
-set title 'SPH-5: plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
+        lines = ", ".join(
+            f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 lc rgb '{COLOURS[k]}' title 'H/dx = {n}{', corrected gradient' if c else ''}'"
+            for k, ((n, c), p) in enumerate(sorted(tips.items()))
+        )
+        drawn["SPH-5"] = figure(
+            "swinging_plate",
+            f"""set xlabel 'time (s)'; set ylabel 'deflection of the tip (mm)'; set key center bottom
+set title 'plate thrown with 0.05 c_0; thin plate: T = 0.2540 s'
 set arrow from 0.127,graph 0 to 0.127,graph 1 nohead dt 2; set label 'T/2' at 0.129,graph 0.95
 plot {lines}
-""")
+""",
+        )
     return drawn
 
 

@@ -7,7 +7,9 @@
 --publish  write the measured part of docs/verification.md and docs/figures instead of a page among the results
 Exit status 1 if a gate is missed or a negative control passes, or a run fails; every case runs all the same.
 """
-import os, sys, time
+import os
+import sys
+import time
 
 
 def main(arguments):
@@ -27,10 +29,21 @@ def main(arguments):
         os.environ["KUZURE_KNOWN"] = "1"
 
     # only now: the environment above is read when common is imported
-    import ablation, table, v_exp_1, v_exp_3, v_exp_4, v_exp_5
+    import ablation
+    import aluminium_bars
+    import cohesive_block
+    import collapsing_columns
+    import slope_safety
+    import table
     from common import PROGRAM, RESULTS, RunFailed
 
-    cases = {"V-EXP-1": v_exp_1, "V-EXP-3": v_exp_3, "V-EXP-4": v_exp_4, "V-EXP-5": v_exp_5, "ablation": ablation}
+    cases = {
+        "V-EXP-1": aluminium_bars,
+        "V-EXP-3": collapsing_columns,
+        "V-EXP-4": slope_safety,
+        "V-EXP-5": cohesive_block,
+        "ablation": ablation,
+    }
     if unknown := set(rest) - set(cases):
         print(f"validate: unknown case {' '.join(sorted(unknown))}; known: {' '.join(cases)}")
         return 2
@@ -48,7 +61,14 @@ def main(arguments):
             failures.append(str(failure))
             print(failure)
     table.main(os.path.join(docs, "verification.md") if "--publish" in flags else os.path.join(RESULTS, "verification.md"))
-    print(f"{time.time() - begin:.0f} s; " + (("all gates met" if "--known" not in flags else "nothing new") if not failures else f"{len(failures)} cases failed:\n  " + "\n  ".join(failures)))
+    print(
+        f"{time.time() - begin:.0f} s; "
+        + (
+            ("all gates met" if "--known" not in flags else "nothing new")
+            if not failures
+            else f"{len(failures)} cases failed:\n  " + "\n  ".join(failures)
+        )
+    )
     return 1 if failures else 0
 
 

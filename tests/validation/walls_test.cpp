@@ -120,3 +120,25 @@ TEST(Walls, PileRestsAtItsFrictionAngle)
     EXPECT_FALSE(c.control("slope at rest of phi = 18 deg, within 4 %", bed, wrong, "deg", 0.04));
     c.curve("surface", {"friction_angle", "start", "x", "z"}, rows);
 }
+
+// A cohesive block thrown along a floor: a smooth one leaves its speed, a rough one takes it, friction is in between.
+TEST(Walls, SmoothOnesLetSlideRoughOnesHold)
+{
+    double left[3];
+    const char* surfaces[3] = {"\"smooth\"", "\"rough\"", "{ friction_angle = 20.0 }"};
+    for (int k = 0; k < 3; ++k) {
+        SceneText t;
+        t.dimensions = 3, t.spacing = 0.04, t.end = 0.1, t.time = "step = 1.0e-4", t.strength = "cohesion = 2.0e4\nfriction_angle = 25.0";
+        t.bodies = box("body", {0, 0, 0}, {0.4, 0.24, 0.16}, "soil = \"s\"\nvelocity = [0.5, 0.0, 0.0]");
+        t.walls = box("wall", {-0.4, -0.4, -0.16}, {1.2, 0.64, 0}, fmt::format("surface = {}", surfaces[k]));
+        t.effects = "gravity = [0.0, 0.0, -9.81]\nviscosity = { alpha = 0.1, beta = 0.0 }";
+        Simulation sim(Comm::world(), t.scene());
+        run_to(sim, t.end);
+        left[k] = linear_momentum(sim).x / (particle_mass(sim, 0) * sim.particles().size()) / 0.5;
+    }
+    EXPECT_GT(left[0], 0.98) << "a smooth wall must not brake";
+    EXPECT_LT(left[1], 0.60) << "a rough wall must brake";
+    // v = v0 - tan(20 deg) g t, while the block bounces on its first contact with gravity
+    EXPECT_NEAR(left[2], 1 - std::tan(20 * pi / 180) * gravity * 0.1 / 0.5, 0.1);
+    EXPECT_GT(left[2], left[1]) << "friction cannot brake more than no slip";
+}

@@ -1,6 +1,7 @@
 #include "solver/app/report/report.hpp"
 #include "solver/app/report/chart.hpp"
 #include "solver/app/report/page.hpp"
+#include "solver/app/report/values.hpp"
 #include "solver/core/simd.hpp"
 #include <algorithm>
 #include <cmath>
@@ -10,84 +11,8 @@ namespace kuzure::report {
 
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr std::uint64_t largest_picture = std::uint64_t(64) << 20, largest_movie = std::uint64_t(512) << 20; // bytes, in a page
 constexpr std::size_t most_notes = 100;
-
-/// "3 min 20 s"
-std::string duration(double seconds)
-{
-    if (!(std::fabs(seconds) < 1e12)) return "-";
-    if (seconds < 1) return fmt::format("{:.2f} s", seconds);
-    if (seconds < 100) return fmt::format("{:.1f} s", seconds);
-    const auto s = std::llround(seconds);
-    if (s < 6000) return fmt::format("{} min {} s", s / 60, s % 60);
-    if (s < 172800) return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
-    return fmt::format("{} d {} h", s / 86400, s % 86400 / 3600);
-}
-
-/// Digits in groups of three, narrow spaces between.
-std::string grouped(double n)
-{
-    if (!std::isfinite(n)) return "-";
-    std::string s = fmt::format("{:.0f}", n);
-    for (auto at = std::ptrdiff_t(s.size()) - 3; at > (n < 0); at -= 3) s.insert(std::size_t(at), "\u202f");
-    return s;
-}
-
-double at(const Json& j, std::initializer_list<const char*> path)
-{
-    const Json* here = &j;
-    for (const char* key : path) {
-        if (!here->is_object() || !here->contains(key)) return std::nan("");
-        here = &(*here)[key];
-    }
-    return here->is_number() ? usable(here->get<double>()) : std::nan("");
-}
-
-/// Of numbers that may not be there, which are no error: x > y, or no.
-bool more(double x, double y) { return std::isgreater(x, y); }
-/// a/b, or no number.
-double ratio(double a, double b) { return more(b, 0) ? a / b : std::nan(""); }
-
-/// The string of a key, or nothing.
-std::string word(const Json& j, const char* key)
-{
-    return j.is_object() && j.contains(key) && j[key].is_string() ? j[key].get<std::string>() : std::string();
-}
-
-/// Seconds with three digits behind the point, or a dash.
-std::string fixed(double seconds) { return std::fabs(seconds) < 1e12 ? fmt::format("{:.3f}", seconds) : "-"; }
-
-/// Strings of an array, if it is one.
-std::vector<std::string> strings(const Json& j, const char* key)
-{
-    std::vector<std::string> out;
-    if (j.contains(key) && j[key].is_array())
-        for (const auto& e : j[key])
-            if (e.is_string()) out.push_back(e.get<std::string>());
-    return out;
-}
-
-std::span<const double> column(const Table& t, const char* name)
-{
-    const auto c = t.find(name);
-    return c == t.end() ? std::span<const double>{} : std::span<const double>(c->second);
-}
-double last(const Table& t, const char* name)
-{
-    const auto c = column(t, name);
-    return c.empty() ? std::nan("") : c.back();
-}
-/// Curves of those columns that exist.
-std::vector<Curve> curves(const Table& t, std::initializer_list<std::pair<const char*, const char*>> wanted)
-{
-    std::vector<Curve> out;
-    for (const auto& [name, label] : wanted)
-        if (const auto c = column(t, name); !c.empty()) out.push_back({label, c});
-    return out;
-}
 
 std::string section(const char* id, const char* title, const std::string& body)
 {

@@ -84,7 +84,8 @@ nlohmann::ordered_json to_json(const SceneFacts& f)
     const Estimate& e = f.estimate;
     auto numbers = nlohmann::ordered_json::object();
     for (const auto& n : scene::dimensionless_numbers(s, filling)) numbers[n.name] = n.value;
-    nlohmann::ordered_json j{{"soil_particles", e.soil},
+    nlohmann::ordered_json j{{"scene_hash", io::scene_hash(s)},
+                             {"soil_particles", e.soil},
                              {"wall_particles", e.walls},
                              {"dt", e.dt},
                              {"steps", e.steps},

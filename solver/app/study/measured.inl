@@ -1,9 +1,9 @@
 // Made by jobs/studies/publish.py from the studies of docs/accuracy.md: errors by layers of particles. Not to be edited.
 R"json([
-{"scene": "K0 column", "measure": "stress", "preset": "seed", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 1000000000000.0}, "points": [[10.0, 0.07944], [20.0, 0.03223], [40.0, 0.01368], [80.0, 0.00982]]},
-{"scene": "K0 column", "measure": "stress", "preset": "fast", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 1000000000000.0}, "points": [[10.0, 0.08162], [20.0, 0.03376], [40.0, 0.0144], [80.0, 0.01006]]},
-{"scene": "K0 column", "measure": "stress", "preset": "standard", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 1000000000000.0}, "points": [[10.0, 0.08774], [20.0, 0.04258], [40.0, 0.02918], [80.0, 0.02702]]},
-{"scene": "K0 column", "measure": "stress", "preset": "accurate", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 1000000000000.0}, "points": [[10.0, 0.07031], [20.0, 0.02631], [40.0, 0.009479], [80.0, 0.004273]]},
+{"scene": "K0 column", "measure": "stress", "preset": "seed", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 48541332.945}, "points": [[10.0, 0.07944], [20.0, 0.03223], [40.0, 0.01368], [80.0, 0.00982]]},
+{"scene": "K0 column", "measure": "stress", "preset": "fast", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 48541332.945}, "points": [[10.0, 0.08162], [20.0, 0.03376], [40.0, 0.0144], [80.0, 0.01006]]},
+{"scene": "K0 column", "measure": "stress", "preset": "standard", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 48541332.945}, "points": [[10.0, 0.08774], [20.0, 0.04258], [40.0, 0.02918], [80.0, 0.02702]]},
+{"scene": "K0 column", "measure": "stress", "preset": "accurate", "about": {"dimensions": 2, "slenderness": 2.5, "friction_angle": 0.0, "cohesion": 48541332.945}, "points": [[10.0, 0.07031], [20.0, 0.02631], [40.0, 0.009479], [80.0, 0.004273]]},
 {"scene": "axisymmetric column", "measure": "profile", "preset": "seed", "about": {"dimensions": 3, "slenderness": 1.0, "friction_angle": 22.2, "cohesion": 0.0}, "points": [[2.0, 0.2538], [4.0, 0.107], [8.0, 0.04795]]},
 {"scene": "axisymmetric column", "measure": "profile", "preset": "fast", "about": {"dimensions": 3, "slenderness": 1.0, "friction_angle": 22.2, "cohesion": 0.0}, "points": [[2.0, 0.2527], [4.0, 0.1177], [8.0, 0.05119]]},
 {"scene": "axisymmetric column", "measure": "profile", "preset": "standard", "about": {"dimensions": 3, "slenderness": 1.0, "friction_angle": 22.2, "cohesion": 0.0}, "points": [[2.0, 0.2512], [4.0, 0.1238], [8.0, 0.05569]]},

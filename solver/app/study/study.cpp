@@ -198,277 +198,143 @@ void measure(const Study& study, Point& p, const io::Path& run)
     }
 }
 
+namespace {
+using Kind = io::SweepReference::Kind;
+
+/// The curve whose finest run, or limit, is the reference: the one the sweep names, else that of the finest run with most pairs.
+std::string reference_curve(const Study& study)
+{
+    std::string chosen = study.sweep.reference.curve;
+    if (study.sweep.reference.kind != Kind::Finest) return chosen;
+    const auto curves = study.curves();
+    if (!chosen.empty() && std::find(curves.begin(), curves.end(), chosen) == curves.end())
+        throw BadInput(fmt::format("reference.finest: expected the name of a curve, found \"{}\"; the curves are {}", chosen,
+                                   fmt::join(curves, "; ")));
+    if (!chosen.empty()) return chosen;
+    double finest = HUGE_VAL, most = 0;
+    for (const auto& p : study.points)
+        if (!p.asked.choice && p.finished() && (p.spacing < finest || (p.spacing == finest && p.pairs > most)))
+            finest = p.spacing, most = p.pairs, chosen = p.asked.curve;
+    return chosen;
+}
+
+/// What the errors of a measure count from, and its words.
+void find_reference(Study& study, Measure m, const std::string& curve, const Point* finest)
+{
+    const auto k = std::size_t(m);
+    auto& note = study.reference_note[k];
+    const Kind kind = study.sweep.reference.kind;
+    if (m == Measure::Residual) note = "0: energy is kept";
+    else if (kind == Kind::ClosedForm) note = "closed form";
+    else if (kind == Kind::Experiment) {
+        note = "experiment";
+        if (m == Measure::Height) study.reference[k] = study.experiment.top;
+        if (m == Measure::Runout && finest == nullptr)
+            for (const auto& p : study.points)
+                if (p.finished()) {
+                    Profile measured = study.experiment;
+                    measured.spread = p.profile.spread, measured.start_low = p.profile.start_low,
+                    measured.start_high = p.profile.start_high;
+                    study.reference[k] = measured.runout(study.grain);
+                    break;
+                }
+        if (m == Measure::PeakSpeed) note = "none: the experiment does not give it";
+    } else if (finest) {
+        note = fmt::format("the finest run of \"{}\", {:g} m", curve, finest->spacing);
+        study.reference[k] = is_error(m) ? unknown : finest->value[k];
+        study.reference_spacing[k] = finest->spacing;
+        for (const auto& c : study.convergence)
+            if (c.curve == curve && c.measure == m) {
+                if (c.result.order) {
+                    study.reference[k] = c.result.limit, study.reference_spacing[k] = 0;
+                    note = fmt::format("limit of \"{}\" by Richardson extrapolation, observed order {:.2f}", curve, *c.result.order);
+                } else {
+                    note += fmt::format("; no extrapolation: {}", c.result.why_not);
+                }
+            }
+    }
+}
+
+/// The error of a measure of one run; what it had where the reference says nothing of it.
+double error_of(const Study& study, const Point& p, Measure m, const Point* finest)
+{
+    const auto k = std::size_t(m);
+    const Kind kind = study.sweep.reference.kind;
+    const bool another = finest && p.hash != finest->hash;
+    switch (m) {
+    case Measure::Residual:
+    case Measure::Stress:
+        return p.value[k];
+    case Measure::Settlement:
+        break; // the closed form is that of its own scene
+    case Measure::Profile:
+        if (kind == Kind::Experiment) {
+            double e2 = 0, r2 = 0;
+            for (std::size_t i = 0; i < study.experiment.at.size(); ++i) {
+                const double e = p.profile(study.experiment.at[i]) - study.experiment.height[i];
+                e2 += e * e, r2 += study.experiment.height[i] * study.experiment.height[i];
+            }
+            return std::sqrt(e2 / r2);
+        }
+        if (another) return profile_distance(p.profile, finest->profile);
+        break;
+    case Measure::FailureLine:
+        if (kind == Kind::Experiment) return line_distance(p.failure, study.experiment_failure) / soil_height(*p.scene);
+        if (another) return line_distance(p.failure, finest->failure) / soil_height(*p.scene);
+        break;
+    default:
+        if (std::isfinite(study.reference[k]) && !(finest && p.hash == finest->hash && study.reference[k] == p.value[k]))
+            return std::fabs(p.value[k] / study.reference[k] - 1);
+    }
+    return p.error[k];
+}
+
+/// Error bars as a run with twins has them, wherever a curve holds h, 2 h and 4 h.
+void add_bars(Study& study, Measure m, const std::string& curve, const Point* finest)
+{
+    const auto k = std::size_t(m);
+    const auto along = study.along(curve);
+    for (const Point* p : along) {
+        const auto at = [&](double factor) {
+            const auto found = std::find_if(along.begin(), along.end(),
+                                            [&](const Point* q) { return std::fabs(q->spacing / p->spacing - factor) < 1e-6; });
+            return found == along.end() ? nullptr : *found;
+        };
+        const Point *two = at(2), *four = at(4);
+        // Against an experiment the bar cannot be judged: it is one of the numbers, not of the model.
+        if (!two || !four || study.sweep.reference.kind == Kind::Experiment) continue;
+        const double truth = m == Measure::Settlement ? p->settlement : study.reference[k];
+        if (p == finest || !std::isfinite(truth)) continue; // of itself the finest says nothing
+        const auto c = converge({{p->spacing, p->value[k]}, {two->spacing, two->value[k]}, {four->spacing, four->value[k]}});
+        study.bars.push_back({curve, m, p->spacing, p->value[k], c.half_width, truth, c.why_not});
+    }
+}
+} // namespace
+
 void compare(Study& study)
 {
-    using Kind = io::SweepReference::Kind;
-    const Kind kind = study.sweep.reference.kind;
     study.reference.fill(unknown), study.reference_spacing.fill(0);
     study.convergence.clear(), study.bars.clear();
     for (auto& note : study.reference_note) note.clear();
 
-    // The curve whose finest run, or limit, is the reference.
-    std::string chosen = study.sweep.reference.curve;
+    const std::string chosen = reference_curve(study);
     const auto curves = study.curves();
-    if (kind == Kind::Finest) {
-        if (!chosen.empty() && std::find(curves.begin(), curves.end(), chosen) == curves.end())
-            throw BadInput(fmt::format("reference.finest: expected the name of a curve, found \"{}\"; the curves are {}", chosen,
-                                       fmt::join(curves, "; ")));
-        double finest = HUGE_VAL, most = 0;
-        if (chosen.empty())
-            for (const auto& p : study.points)
-                if (!p.asked.choice && p.finished() && (p.spacing < finest || (p.spacing == finest && p.pairs > most)))
-                    finest = p.spacing, most = p.pairs, chosen = p.asked.curve;
-    }
-    const auto reference_curve = study.along(chosen);
-    const Point* finest = reference_curve.empty() ? nullptr : reference_curve.back();
-
+    const auto runs = study.along(chosen);
+    const Point* finest = runs.empty() ? nullptr : runs.back();
     for (const Measure m : study.sweep.measures) {
         const auto k = std::size_t(m);
-        auto& note = study.reference_note[k];
         for (const auto& curve : curves) {
             if (is_error(m)) continue;
             std::vector<Sample> samples;
             for (const Point* p : study.along(curve)) samples.push_back({p->spacing, p->value[k]});
             study.convergence.push_back({curve, m, converge(samples)});
         }
-        if (m == Measure::Residual) note = "0: energy is kept";
-        else if (kind == Kind::ClosedForm) note = "closed form";
-        else if (kind == Kind::Experiment) {
-            note = "experiment";
-            if (m == Measure::Height) study.reference[k] = study.experiment.top;
-            if (m == Measure::Runout && finest == nullptr)
-                for (const auto& p : study.points)
-                    if (p.finished()) {
-                        Profile measured = study.experiment;
-                        measured.spread = p.profile.spread, measured.start_low = p.profile.start_low,
-                        measured.start_high = p.profile.start_high;
-                        study.reference[k] = measured.runout(study.grain);
-                        break;
-                    }
-            if (m == Measure::PeakSpeed) note = "none: the experiment does not give it";
-        } else if (finest) {
-            note = fmt::format("the finest run of \"{}\", {:g} m", chosen, finest->spacing);
-            study.reference[k] = is_error(m) ? unknown : finest->value[k];
-            study.reference_spacing[k] = finest->spacing;
-            for (const auto& c : study.convergence)
-                if (c.curve == chosen && c.measure == m) {
-                    if (c.result.order) {
-                        study.reference[k] = c.result.limit, study.reference_spacing[k] = 0;
-                        note = fmt::format("limit of \"{}\" by Richardson extrapolation, observed order {:.2f}", chosen, *c.result.order);
-                    } else {
-                        note += fmt::format("; no extrapolation: {}", c.result.why_not);
-                    }
-                }
-        }
-        for (auto& p : study.points) {
-            if (!p.finished()) continue;
-            double& error = p.error[k];
-            switch (m) {
-            case Measure::Residual:
-            case Measure::Stress:
-                error = p.value[k];
-                break;
-            case Measure::Settlement:
-                break; // the closed form is that of its own scene
-            case Measure::Profile:
-                if (kind == Kind::Experiment) {
-                    double e2 = 0, r2 = 0;
-                    for (std::size_t i = 0; i < study.experiment.at.size(); ++i) {
-                        const double e = p.profile(study.experiment.at[i]) - study.experiment.height[i];
-                        e2 += e * e, r2 += study.experiment.height[i] * study.experiment.height[i];
-                    }
-                    error = std::sqrt(e2 / r2);
-                } else if (finest && p.hash != finest->hash) error = profile_distance(p.profile, finest->profile);
-                break;
-            case Measure::FailureLine:
-                if (kind == Kind::Experiment) error = line_distance(p.failure, study.experiment_failure) / soil_height(*p.scene);
-                else if (finest && p.hash != finest->hash) error = line_distance(p.failure, finest->failure) / soil_height(*p.scene);
-                break;
-            default:
-                if (std::isfinite(study.reference[k]) && !(finest && p.hash == finest->hash && study.reference[k] == p.value[k]))
-                    error = std::fabs(p.value[k] / study.reference[k] - 1);
-            }
-        }
-        // Error bars as a run with twins has them, wherever the table holds h, 2 h and 4 h.
-        if (is_error(m)) continue;
-        for (const auto& curve : curves) {
-            const auto along = study.along(curve);
-            for (const Point* p : along) {
-                const auto at = [&](double factor) {
-                    const auto found = std::find_if(along.begin(), along.end(),
-                                                    [&](const Point* q) { return std::fabs(q->spacing / p->spacing - factor) < 1e-6; });
-                    return found == along.end() ? nullptr : *found;
-                };
-                const Point *two = at(2), *four = at(4);
-                // Against an experiment the bar cannot be judged: it is one of the numbers, not of the model.
-                if (!two || !four || kind == Kind::Experiment) continue;
-                const double truth = m == Measure::Settlement ? p->settlement : study.reference[k];
-                if (p == finest || !std::isfinite(truth)) continue; // of itself the finest says nothing
-                const auto c = converge({{p->spacing, p->value[k]}, {two->spacing, two->value[k]}, {four->spacing, four->value[k]}});
-                study.bars.push_back({curve, m, p->spacing, p->value[k], c.half_width, truth, c.why_not});
-            }
-        }
+        find_reference(study, m, chosen, finest);
+        for (auto& p : study.points)
+            if (p.finished()) p.error[k] = error_of(study, p, m, finest);
+        for (const auto& curve : curves)
+            if (!is_error(m)) add_bars(study, m, curve, finest);
     }
-}
-
-nlohmann::ordered_json to_json(const Study& study)
-{
-    using Json = nlohmann::ordered_json;
-    const auto& names = io::measure_names();
-    Json j;
-    j["title"] = study.sweep.title;
-    j["scene"] = study.sweep.scene.filename().string();
-    j["window"] = study.window, j["grain"] = study.grain;
-    for (const auto& p : study.points)
-        if (p.scene) {
-            const Scene& s = *p.scene;
-            double friction = 0, cohesion = 0;
-            for (const auto& soil : s.soils)
-                friction = std::max(friction, soil.friction_angle * 57.29577951308232), cohesion = std::max(cohesion, soil.cohesion);
-            const scene::Filling filling(s);
-            const auto& b = filling.soil_bounds();
-            const double height = b.high.z - b.low.z + p.spacing, width = b.high.x - b.low.x + p.spacing;
-            j["about"] = {{"dimensions", s.dimensions},
-                          {"height", height},
-                          {"slenderness", height / (0.5 * width)},
-                          {"friction_angle", friction},
-                          {"cohesion", cohesion}};
-            break;
-        }
-    j["measures"] = Json::object();
-    for (const auto m : study.sweep.measures)
-        j["measures"][names[std::size_t(m)]] = {{"reference", study.reference[std::size_t(m)]},
-                                                {"from", study.reference_note[std::size_t(m)]},
-                                                {"spacing", study.reference_spacing[std::size_t(m)]}};
-    j["scatter"] = study.sweep.reference.scatter;
-    const Point* base = study.base();
-    j["points"] = Json::array();
-    for (const auto& p : study.points) {
-        Json row{{"curve", p.asked.curve}, {"choice", p.asked.choice}, {"settings", p.asked.sets},
-                 {"folder", p.folder},     {"scene_hash", p.hash},     {"exit_code", p.exit_code}};
-        if (!p.message.empty()) row["message"] = p.message;
-        if (p.scene) {
-            Json scene{{"spacing", p.spacing}, {"base_strain", p.base_strain}, {"mach", p.mach}};
-            row.update(scene);
-        }
-        if (p.finished()) {
-            row.update(Json{{"particles", p.particles},
-                            {"steps", p.steps},
-                            {"pairs", p.pairs},
-                            {"work", p.work},
-                            {"core_seconds", p.core_seconds},
-                            {"wall_seconds", p.wall_seconds}});
-            row["values"] = Json::object(), row["errors"] = Json::object();
-            for (const auto m : study.sweep.measures) {
-                row["values"][names[std::size_t(m)]] = p.value[std::size_t(m)];
-                row["errors"][names[std::size_t(m)]] = p.error[std::size_t(m)];
-            }
-            if (base && p.asked.choice && &p != base) {
-                row["against_base"] = {{"core_seconds", p.core_seconds / base->core_seconds}, {"work", p.work / base->work}};
-                for (const auto m : study.sweep.measures)
-                    row["against_base"][names[std::size_t(m)]] = p.error[std::size_t(m)] - base->error[std::size_t(m)];
-            }
-        }
-        j["points"].push_back(std::move(row));
-    }
-    j["curves"] = Json::array();
-    for (const auto& curve : study.curves()) {
-        Json c{{"curve", curve}};
-        for (const auto m : study.sweep.measures) {
-            Json entry;
-            for (const auto& [percent, label] :
-                 {std::pair{0.05, "core_seconds_to_5_percent"}, std::pair{0.01, "core_seconds_to_1_percent"}}) {
-                const auto t = cost_at(study.prices(curve, m, false), percent);
-                entry[label] = t ? Json(*t) : Json();
-            }
-            for (const auto& conv : study.convergence)
-                if (conv.curve == curve && conv.measure == m) {
-                    entry["order"] = conv.result.order ? Json(*conv.result.order) : Json();
-                    if (conv.result.order) entry["limit"] = conv.result.limit, entry["half_width"] = conv.result.half_width;
-                    else entry["no_extrapolation"] = conv.result.why_not;
-                }
-            c[names[std::size_t(m)]] = entry;
-        }
-        j["curves"].push_back(std::move(c));
-    }
-    j["pareto"] = Json::object();
-    for (const auto m : study.sweep.measures) {
-        std::vector<Price> all;
-        std::vector<const Point*> who;
-        for (const auto& p : study.points)
-            if (p.finished() && study.tells(p, m)) all.push_back({p.core_seconds, p.error[std::size_t(m)]}), who.push_back(&p);
-        Json front = Json::array();
-        for (const auto i : pareto_front(all))
-            front.push_back(
-                {{"curve", who[i]->asked.curve}, {"spacing", who[i]->spacing}, {"core_seconds", all[i].cost}, {"error", all[i].error}});
-        j["pareto"][names[std::size_t(m)]] = front;
-    }
-    j["error_bars"] = Json::array();
-    for (const auto& b : study.bars) {
-        Json row{
-            {"curve", b.curve}, {"measure", names[std::size_t(b.measure)]}, {"spacing", b.spacing}, {"value", b.value}, {"truth", b.truth}};
-        if (b.why_not.empty())
-            row["half_width"] = b.half_width, row["covers"] = b.covers(),
-            row["half_width_over_error"] = b.half_width / std::fabs(b.value - b.truth);
-        else row["no_interval"] = b.why_not;
-        j["error_bars"].push_back(std::move(row));
-    }
-    return j;
-}
-
-std::string to_csv(const Study& study)
-{
-    std::string out = "curve,choice,spacing,particles,steps,pairs,work,core_seconds,wall_seconds,exit_code,base_strain,mach";
-    for (const auto m : study.sweep.measures) {
-        std::string name = io::measure_names()[std::size_t(m)];
-        std::replace(name.begin(), name.end(), ' ', '_'), std::replace(name.begin(), name.end(), '-', '_');
-        out += fmt::format(",{0},{0}_error", name);
-    }
-    out += "\n";
-    const auto number = [](double x) { return std::isfinite(x) ? fmt::format("{:.9g}", x) : std::string(); };
-    for (const auto& p : study.points) {
-        std::string curve;
-        for (const char c : p.asked.curve) curve += c == '"' ? std::string("\"\"") : std::string(1, c);
-        out += fmt::format("\"{}\",{},{},{},{},{},{},{},{},{},{},{}", curve, int(p.asked.choice), p.scene ? number(p.spacing) : "",
-                           p.particles, p.steps, number(p.pairs), number(p.work), number(p.core_seconds), number(p.wall_seconds),
-                           p.exit_code, number(p.base_strain), number(p.mach));
-        for (const auto m : study.sweep.measures)
-            out += p.finished() ? "," + number(p.value[std::size_t(m)]) + "," + number(p.error[std::size_t(m)]) : ",,";
-        out += "\n";
-    }
-    return out;
-}
-
-std::string to_text(const Study& study)
-{
-    const auto& names = io::measure_names();
-    std::string out = fmt::format("{}\n\n{:<34} {:>9} {:>9} {:>8} {:>10} {:>9}", study.sweep.title, "curve", "spacing", "particles",
-                                  "steps", "pairs", "core-s");
-    for (const auto m : study.sweep.measures) out += fmt::format(" {:>12}", names[std::size_t(m)]);
-    out += "\n";
-    for (const auto& p : study.points) {
-        const auto name = p.asked.curve.size() > 34 ? p.asked.curve.substr(0, 31) + "..." : p.asked.curve;
-        if (!p.finished()) {
-            out += fmt::format("{:<34} {:>9.4g} {}: {}\n", name, p.spacing,
-                               p.exit_code < 0 ? std::string("-") : fmt::format("exit {}", p.exit_code),
-                               p.message.substr(0, p.message.find('\n')));
-            continue;
-        }
-        out +=
-            fmt::format("{:<34} {:>9.4g} {:>9} {:>8} {:>10.3g} {:>9.2f}", name, p.spacing, p.particles, p.steps, p.pairs, p.core_seconds);
-        for (const auto m : study.sweep.measures) {
-            const double e = p.error[std::size_t(m)];
-            out += std::isfinite(e) ? fmt::format(" {:>10.2f} %", 100 * e) : fmt::format(" {:>12}", "-");
-        }
-        out += "\n";
-    }
-    out += "\nerrors count from:\n";
-    for (const auto m : study.sweep.measures)
-        out += fmt::format("  {:<13} {}\n", names[std::size_t(m)], study.reference_note[std::size_t(m)]);
-    for (const auto& c : study.convergence)
-        if (!c.result.order)
-            out += fmt::format("no extrapolation of {} along \"{}\": {}\n", names[std::size_t(c.measure)], c.curve, c.result.why_not);
-    return out;
 }
 
 } // namespace kuzure::study

@@ -12,10 +12,36 @@ import numpy as np
 from common import COLOURS, GRAVITY, Case, changed, figure, first_crossing, last_crossing, run, surface, thickness
 
 # Digitised experiment, mm: LandslideSIM/MaterialPointSolver.jl, MIT licence.
-SURFACE = np.array([(0, 99.2), (20, 99.3), (40, 95.9), (60, 89.0), (80, 84.4), (100, 77.6), (120, 72.2), (140, 66.5), (160, 61.6), (180, 53.9), (200, 47.4),
-                    (220, 42.5), (241, 34.8), (262, 30.7), (282, 26.5), (302, 21.5), (322, 18.9), (342, 13.6), (362, 10.9), (382, 7.9), (402, 3.7),
-                    (422, 2.2), (442, 1.5)])
-FAILURE = np.array([(21.2, 98.9), (39.8, 90.1), (60.0, 80.2), (79.7, 65.2), (99.9, 54.5), (119.6, 36.8), (139.4, 25.7), (159.6, 10.4), (179.4, 0.5)])
+SURFACE = np.array(
+    [
+        (0, 99.2),
+        (20, 99.3),
+        (40, 95.9),
+        (60, 89.0),
+        (80, 84.4),
+        (100, 77.6),
+        (120, 72.2),
+        (140, 66.5),
+        (160, 61.6),
+        (180, 53.9),
+        (200, 47.4),
+        (220, 42.5),
+        (241, 34.8),
+        (262, 30.7),
+        (282, 26.5),
+        (302, 21.5),
+        (322, 18.9),
+        (342, 13.6),
+        (362, 10.9),
+        (382, 7.9),
+        (402, 3.7),
+        (422, 2.2),
+        (442, 1.5),
+    ]
+)
+FAILURE = np.array(
+    [(21.2, 98.9), (39.8, 90.1), (60.0, 80.2), (79.7, 65.2), (99.9, 54.5), (119.6, 36.8), (139.4, 25.7), (159.6, 10.4), (179.4, 0.5)]
+)
 TOE = 396.0  # mm, where the experiment is 5 mm high
 
 
@@ -26,11 +52,22 @@ def scene(mm, **changes):
         "dimensions": 2,
         "space": {"spacing": dx, "h": 1.3},
         "time": {"end": 0.8},  # 8 sqrt(H/g): three times the time the collapse takes
-        "soil": {"bars": {"density": 2650.0, "young": 0.84e6, "poisson": 0.3, "cohesion": 0.0, "friction_angle": 19.8, "dilation_angle": 0.0,
-                          "cone": "plane strain"}},
+        "soil": {
+            "bars": {
+                "density": 2650.0,
+                "young": 0.84e6,
+                "poisson": 0.3,
+                "cohesion": 0.0,
+                "friction_angle": 19.8,
+                "dilation_angle": 0.0,
+                "cone": "plane strain",
+            }
+        },
         "body": [{"soil": "bars", "box": {"low": [0.0, 0.0, 0.0], "high": [0.2, 0.0, 0.1]}, "stress": "at rest"}],
-        "wall": [{"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [0.72, 0.0, 0.0]}},
-                 {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 0.12]}}],
+        "wall": [
+            {"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [0.72, 0.0, 0.0]}},
+            {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 0.12]}},
+        ],
         "effects": {"gravity": [0.0, 0.0, -GRAVITY], "viscosity": {"alpha": 0.1, "beta": 0.0}},
         "accuracy": {"kernel": "cubic spline"},
         "output": {"every": 0.2, "history": 0.004},
@@ -76,25 +113,59 @@ def measure(result, mm):
         return 100 * np.sqrt(np.sum((y - SURFACE[:, 1]) ** 2) / np.sum(SURFACE[:, 1] ** 2))
 
     history = result.history()
-    return {"at": at, "height": height, "top": top, "line_x": moved_x, "line_z": moved_z, "error": error(height), "error_top": error(top),
-            "toe": 0.5 * (first_crossing(at, height, 5.0) + last_crossing(at, height, 5.0)), "toe_top": last_crossing(at, top, 5.0), "front": float(np.percentile(position[:, 0], 99.9)),
-            "line": float(np.sqrt(np.mean(gap**2))), "line_mean": float(gap.mean()), "line_sheared": float(np.sqrt(np.mean(sheared_gap**2))),
-            "speed": float(history["max_speed"].max()), "moving": float(history["kinetic"][-1] / history["kinetic"].max()),
-            "residual": 100 * abs(float(history["residual"][-1])), "seconds": result.seconds}
+    return {
+        "at": at,
+        "height": height,
+        "top": top,
+        "line_x": moved_x,
+        "line_z": moved_z,
+        "error": error(height),
+        "error_top": error(top),
+        "toe": 0.5 * (first_crossing(at, height, 5.0) + last_crossing(at, height, 5.0)),
+        "toe_top": last_crossing(at, top, 5.0),
+        "front": float(np.percentile(position[:, 0], 99.9)),
+        "line": float(np.sqrt(np.mean(gap**2))),
+        "line_mean": float(gap.mean()),
+        "line_sheared": float(np.sqrt(np.mean(sheared_gap**2))),
+        "speed": float(history["max_speed"].max()),
+        "moving": float(history["kinetic"][-1] / history["kinetic"].max()),
+        "residual": 100 * abs(float(history["residual"][-1])),
+        "seconds": result.seconds,
+    }
 
 
 def record_gates(case, m, mm, gate=True):
     """The gates; at a spacing too coarse for them, or for information, without a verdict."""
     tag = f"spacing {mm:g} mm: "
-    more = {"seconds": m["seconds"], "figure": "v_exp_1_profile.png"}
-    for surface_by, error, toe, note in (("volume", m["error"], m["toe"], f"99.9 % of the soil within {m['front']:.0f} mm"),
-                                         ("highest bars", m["error_top"], m["toe_top"], "single bars on the toe count in full")):
+    more = {"seconds": m["seconds"], "figure": "aluminium_bars_profile.png"}
+    for surface_by, error, toe, note in (
+        ("volume", m["error"], m["toe"], f"99.9 % of the soil within {m['front']:.0f} mm"),
+        ("highest bars", m["error_top"], m["toe_top"], "single bars on the toe count in full"),
+    ):
         case.record(tag + f"profile error P_d, surface by {surface_by}", 0.0, error, "%", "<= 5 %", error <= 5.0 if gate else None, **more)
-        case.record(tag + f"x where the deposit is 5 mm high, surface by {surface_by}", TOE, toe, "mm", "+-5 %",
-                    abs(toe - TOE) <= 0.05 * TOE if gate else None, note=note, **more)
-    case.record(tag + "failure line (moved more than 1 mm), RMS distance", 0.0, m["line"], "mm", "<= 5 mm", m["line"] <= 5.0 if gate else None,
-                note=f"mean distance {m['line_mean']:+.1f} mm; plastic strain > 0.1 instead: {m['line_sheared']:.1f} mm", **more)
-    case.record(tag + "energy ledger, residual of the potential drop", 0.0, m["residual"], "%", "<= 1 %", m["residual"] <= 1.0, seconds=m["seconds"])
+        case.record(
+            tag + f"x where the deposit is 5 mm high, surface by {surface_by}",
+            TOE,
+            toe,
+            "mm",
+            "+-5 %",
+            abs(toe - TOE) <= 0.05 * TOE if gate else None,
+            note=note,
+            **more,
+        )
+    case.record(
+        tag + "failure line (moved more than 1 mm), RMS distance",
+        0.0,
+        m["line"],
+        "mm",
+        "<= 5 mm",
+        m["line"] <= 5.0 if gate else None,
+        note=f"mean distance {m['line_mean']:+.1f} mm; plastic strain > 0.1 instead: {m['line_sheared']:.1f} mm",
+        **more,
+    )
+    case.record(
+        tag + "energy ledger, residual of the potential drop", 0.0, m["residual"], "%", "<= 1 %", m["residual"] <= 1.0, seconds=m["seconds"]
+    )
 
 
 SENSITIVITY = [
@@ -118,16 +189,25 @@ def draw(case, runs):
         apart = slice(None, None, 8)  # mm: about one point for each column that the height was measured in
         profile = case.curve(f"profile-{name}", x_mm=m["at"][apart], z_mm=m["height"][apart])
         line = case.curve(f"failure-{name}", x_mm=m["line_x"], z_mm=m["line_z"])
-        plots += [f"'{profile}' every ::1 u 1:($2>0.3?$2:1/0) w l lw 2 lc rgb '{colour}' t '{label}'",
-                  f"'{line}' every ::1 u 1:2 w l lw 1.6 dt 2 lc rgb '{colour}' notitle"]
+        plots += [
+            f"'{profile}' every ::1 u 1:($2>0.3?$2:1/0) w l lw 2 lc rgb '{colour}' t '{label}'",
+            f"'{line}' every ::1 u 1:2 w l lw 1.6 dt 2 lc rgb '{colour}' notitle",
+        ]
     prefix = case.curve("initial", x_mm=np.array([0, 200, 200]), z_mm=np.array([100, 100, 0]))
     folder = prefix[: -len("initial.csv")]
-    plots += [f"'{prefix}' every ::1 u 1:2 w l lw 1 lc rgb '#909090' t 'before'",
-              f"'{folder}experiment-surface.csv' every ::1 u 1:2 w p pt 7 ps 0.8 lc rgb 'black' t 'experiment, surface (Bui et al. 2008)'",
-              f"'{folder}experiment-failure.csv' every ::1 u 1:2 w p pt 6 ps 0.9 lc rgb 'black' t 'experiment, failure line'"]
-    figure("v_exp_1_profile", """set xlabel 'x (mm)'; set ylabel 'height (mm)'; set xrange [0:500]; set yrange [0:120]; set key top right
+    plots += [
+        f"'{prefix}' every ::1 u 1:2 w l lw 1 lc rgb '#909090' t 'before'",
+        f"'{folder}experiment-surface.csv' every ::1 u 1:2 w p pt 7 ps 0.8 lc rgb 'black' t 'experiment, surface (Bui et al. 2008)'",
+        f"'{folder}experiment-failure.csv' every ::1 u 1:2 w p pt 6 ps 0.9 lc rgb 'black' t 'experiment, failure line'",
+    ]
+    figure(
+        "aluminium_bars_profile",
+        """set xlabel 'x (mm)'; set ylabel 'height (mm)'; set xrange [0:500]; set yrange [0:120]; set key top right
 set title 'Collapse of aluminium bars: surface (full) and failure line (dashed)'
-plot """ + ", ".join(plots), size=(880, 430))
+plot """
+        + ", ".join(plots),
+        size=(880, 430),
+    )
 
 
 def main(quick=False, slow=False):
@@ -138,22 +218,40 @@ def main(quick=False, slow=False):
         m = measure(run(scene(mm), "V-EXP-1", f"plane-{mm}mm", minutes=20), mm)
         record_gates(case, m, mm, gate=mm < 4)
         if quick:
-            case.record("spacing 4 mm: profile error P_d, as a coarse gate", 0.0, m["error"], "%", "<= 5 %", m["error"] <= 5.0, seconds=m["seconds"])
+            case.record(
+                "spacing 4 mm: profile error P_d, as a coarse gate", 0.0, m["error"], "%", "<= 5 %", m["error"] <= 5.0, seconds=m["seconds"]
+            )
         shown.append((f"plane-strain cone, {mm:g} mm", f"plane-{mm}mm", m))
     mm = 4 if quick else 2
-    for label, name, changes in (("compression cone", "compression", {"soil.cone": "compression"}), ("phi 30 deg", "phi30", {"soil.friction_angle": 30.0})):
+    for label, name, changes in (
+        ("compression cone", "compression", {"soil.cone": "compression"}),
+        ("phi 30 deg", "phi30", {"soil.friction_angle": 30.0}),
+    ):
         m = measure(run(scene(mm, **changes), "V-EXP-1", f"{name}-{mm}mm"), mm)
-        case.control(f"{label}, spacing {mm} mm: profile error P_d > 5 %", m["error"] > 5.0, m["error"], "%", seconds=m["seconds"],
-                     note=f"5 mm high at {m['toe']:.0f} mm, failure line {m['line']:.1f} mm off", figure="v_exp_1_profile.png")
+        case.control(
+            f"{label}, spacing {mm} mm: profile error P_d > 5 %",
+            m["error"] > 5.0,
+            m["error"],
+            "%",
+            seconds=m["seconds"],
+            note=f"5 mm high at {m['toe']:.0f} mm, failure line {m['line']:.1f} mm off",
+            figure="aluminium_bars_profile.png",
+        )
         shown.append((f"{label}, {mm:g} mm", f"{name}-{mm}mm", m))
     draw(case, shown)
     if not quick:
         reference = shown[0][2]
         for label, changes in SENSITIVITY:
             m = measure(run(scene(4, **changes), "V-EXP-1", "sensitivity-" + label.replace(" ", "-").replace(",", "")), 4)
-            case.record(f"sensitivity, spacing 4 mm: {label}: x where 5 mm high", round(reference["toe"], 1), m["toe"], "mm", seconds=m["seconds"],
-                        note=f"P_d {m['error']:.2f} % (base {reference['error']:.2f}), failure line {m['line']:.1f} mm (base {reference['line']:.1f}), "
-                             f"greatest speed {m['speed']:.2f} m/s (base {reference['speed']:.2f})")
+            case.record(
+                f"sensitivity, spacing 4 mm: {label}: x where 5 mm high",
+                round(reference["toe"], 1),
+                m["toe"],
+                "mm",
+                seconds=m["seconds"],
+                note=f"P_d {m['error']:.2f} % (base {reference['error']:.2f}), failure line {m['line']:.1f} mm (base {reference['line']:.1f}), "
+                f"greatest speed {m['speed']:.2f} m/s (base {reference['speed']:.2f})",
+            )
     return case.done()
 
 

@@ -4,7 +4,7 @@
 using namespace kuzure;
 using namespace kuzure::validation;
 
-TEST(H13Long, HeapAtRest)
+TEST(HeapAtRest, InFullLength)
 {
     Case c("H13-long");
     struct Kernel {
@@ -22,7 +22,7 @@ TEST(H13Long, HeapAtRest)
     }
 }
 
-TEST(H13Long, TheSeedsHeapAtRest)
+TEST(HeapAtRest, OfTheSeed)
 {
     Case c("H13-seed");
     // The cube of 0.8 m of jobs/scenes/quickstart.toml as 15^3 particles; it has come to rest after 4.4 s.

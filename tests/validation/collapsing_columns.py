@@ -26,15 +26,23 @@ def law(below, at, above, power):
 
 
 RUNOUT = {
-    "plane": {"Lube 2005, experiment": law(1.2, 2.3, 1.9, 2 / 3), "Lajeunesse 2005, experiment": law(1.8, 3, 2.3, 2 / 3),
-              "Kumar 2015, DEM": law(1.67, 2.7, 2.7, 2 / 3), "Lagree 2011, mu(I) continuum": law(2.2, 7, 3.9, 0.7)},
+    "plane": {
+        "Lube 2005, experiment": law(1.2, 2.3, 1.9, 2 / 3),
+        "Lajeunesse 2005, experiment": law(1.8, 3, 2.3, 2 / 3),
+        "Kumar 2015, DEM": law(1.67, 2.7, 2.7, 2 / 3),
+        "Lagree 2011, mu(I) continuum": law(2.2, 7, 3.9, 0.7),
+    },
     "axisymmetric": {"Lube 2004, experiment": law(1.24, 1.7, 1.6, 0.5), "Lajeunesse 2004, experiment": law(1.35, 0.74, 2.0, 0.5)},
 }
 HEIGHT = {
-    "plane": {"Lajeunesse 2005, experiment": lambda a: np.where(np.asarray(a) < 0.7, a, np.asarray(a, float) ** (1 / 3)),
-              "Lagree 2011, mu(I) continuum": lambda a: np.where(np.asarray(a) < 0.6, a, 0.65 * np.asarray(a, float) ** 0.35)},
-    "axisymmetric": {"Lube 2004, experiment": lambda a: np.where(np.asarray(a) < 0.85, a, 0.88 * np.asarray(a, float) ** (1 / 6)),
-                     "Lajeunesse 2004, experiment": lambda a: np.where(np.asarray(a) < 0.74, a, 0.74)},
+    "plane": {
+        "Lajeunesse 2005, experiment": lambda a: np.where(np.asarray(a) < 0.7, a, np.asarray(a, float) ** (1 / 3)),
+        "Lagree 2011, mu(I) continuum": lambda a: np.where(np.asarray(a) < 0.6, a, 0.65 * np.asarray(a, float) ** 0.35),
+    },
+    "axisymmetric": {
+        "Lube 2004, experiment": lambda a: np.where(np.asarray(a) < 0.85, a, 0.88 * np.asarray(a, float) ** (1 / 6)),
+        "Lajeunesse 2004, experiment": lambda a: np.where(np.asarray(a) < 0.74, a, 0.74),
+    },
 }
 BREAK = {"plane": 2.5, "axisymmetric": 1.7}  # between the two power laws, as published
 POWER = {"plane": 2 / 3, "axisymmetric": 0.5}
@@ -48,8 +56,10 @@ def scene(kind, a, across=None, **changes):
     reach = dx * np.ceil(reach / dx)
     if kind == "plane":
         body = {"box": {"low": [0.0, 0.0, 0.0], "high": [L0, 0.0, height]}}
-        wall = [{"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [reach, 0.0, 0.0]}},
-                {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, height + 4 * dx]}}]
+        wall = [
+            {"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [reach, 0.0, 0.0]}},
+            {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, height + 4 * dx]}},
+        ]
     else:
         body = {"cylinder": {"base": [0.0, 0.0, 0.0], "radius": L0, "height": height}}
         wall = [{"surface": "rough", "cylinder": {"base": [0.0, 0.0, -4 * dx], "radius": reach, "height": 4 * dx}}]
@@ -85,10 +95,21 @@ def measure(result, kind, a, across=None, level=None):
     front = 0.5 * (first_crossing(at, profile, level) + last_crossing(at, profile, level))  # the profile is noisy there
     history = result.history()
     last = history[-1]
-    seen = [last["front_max_x"]] if kind == "plane" else [-last["front_min_x"], last["front_max_x"], -last["front_min_y"], last["front_max_y"]]
-    return {"a": a, "runout": (front - L0) / L0, "runout_history": (np.mean(seen) - L0) / L0, "height": float(last["height"]) / L0, "at": at / L0,
-            "profile": profile / L0, "moving": float(last["kinetic"] / history["kinetic"].max()), "seconds": result.seconds,
-            "residual": 100 * abs(float(last["residual"])), "particles": result.summary["soil_particles"]}
+    seen = (
+        [last["front_max_x"]] if kind == "plane" else [-last["front_min_x"], last["front_max_x"], -last["front_min_y"], last["front_max_y"]]
+    )
+    return {
+        "a": a,
+        "runout": (front - L0) / L0,
+        "runout_history": (np.mean(seen) - L0) / L0,
+        "height": float(last["height"]) / L0,
+        "at": at / L0,
+        "profile": profile / L0,
+        "moving": float(last["kinetic"] / history["kinetic"].max()),
+        "seconds": result.seconds,
+        "residual": 100 * abs(float(last["residual"])),
+        "particles": result.summary["soil_particles"],
+    }
 
 
 def exponent(rows):
@@ -101,16 +122,31 @@ def gate_at_2(m):
 
 
 def record_gate_at_2(case, m):
-    more = {"seconds": m["seconds"], "figure": "v_exp_3_runout.png"}
-    case.record("plane, a = 2: gate on the run-out", "2.40 to 3.60", m["runout"], "L0", "inside", 2.40 <= m["runout"] <= 3.60,
-                note=f"outermost grain {m['runout_history']:.2f}", **more)
+    more = {"seconds": m["seconds"], "figure": "collapsing_columns_runout.png"}
+    case.record(
+        "plane, a = 2: gate on the run-out",
+        "2.40 to 3.60",
+        m["runout"],
+        "L0",
+        "inside",
+        2.40 <= m["runout"] <= 3.60,
+        note=f"outermost grain {m['runout_history']:.2f}",
+        **more,
+    )
     case.record("plane, a = 2: gate on the height", "0.8 to 1.7", m["height"], "L0", "inside", 0.8 <= m["height"] <= 1.7, **more)
 
 
 def control(case):
     """mu = tan(phi) = 2: the soil hardly spreads, and the a = 2 gate has to see it."""
     m = measure(run(scene("plane", 2, **{"soil.friction_angle": 63.43}), "V-EXP-3", "plane-2-mu2"), "plane", 2)
-    case.control("plane, a = 2, mu = 2: the a = 2 gate", not gate_at_2(m), m["runout"], "L0", note=f"height {m['height']:.2f} L0", seconds=m["seconds"])
+    case.control(
+        "plane, a = 2, mu = 2: the a = 2 gate",
+        not gate_at_2(m),
+        m["runout"],
+        "L0",
+        note=f"height {m['height']:.2f} L0",
+        seconds=m["seconds"],
+    )
 
 
 VARIANTS = [
@@ -124,12 +160,23 @@ VARIANTS = [
 def sensitivity(case, base):
     for label, name, across, changes in VARIANTS:
         m = measure(run(scene("plane", 2, across, **changes), "V-EXP-3", "plane-2-" + name), "plane", 2, across, level=L0 / 20)
-        case.record(f"sensitivity, plane, a = 2: {label}: run-out", round(base["runout"], 3), m["runout"], "L0", seconds=m["seconds"],
-                    note=f"height {m['height']:.2f} (base {base['height']:.2f})")
+        case.record(
+            f"sensitivity, plane, a = 2: {label}: run-out",
+            round(base["runout"], 3),
+            m["runout"],
+            "L0",
+            seconds=m["seconds"],
+            note=f"height {m['height']:.2f} (base {base['height']:.2f})",
+        )
     # A front one spacing high cuts the more off a deposit the thinner it is: how much of the exponent is that?
     fine = [measure(run(scene("plane", a, 40), "V-EXP-3", f"plane-{a:g}-40"), "plane", a, 40) for a in (0.5, 1, 2)]
-    case.record("sensitivity, plane: exponent below the break with 40 spacings across L0", 1.0, exponent(fine), seconds=sum(m["seconds"] for m in fine),
-                note="run-out " + ", ".join(f"{m['runout']:.2f} at a = {m['a']:g}" for m in fine))
+    case.record(
+        "sensitivity, plane: exponent below the break with 40 spacings across L0",
+        1.0,
+        exponent(fine),
+        seconds=sum(m["seconds"] for m in fine),
+        note="run-out " + ", ".join(f"{m['runout']:.2f} at a = {m['a']:g}" for m in fine),
+    )
 
 
 def sweep(case, kind, aspects):
@@ -138,17 +185,33 @@ def sweep(case, kind, aspects):
         m = measure(run(scene(kind, a), "V-EXP-3", f"{kind}-{a:g}", minutes=40), kind, a)
         rows.append(m)
         laws = {name: float(f(a)) for name, f in RUNOUT[kind].items()}
-        case.record(f"{kind}, a = {a:g}: run-out", f"{min(laws.values()):.2f} to {max(laws.values()):.2f} (laws)", m["runout"], "L0", seconds=m["seconds"],
-                    note=f"outermost grain {m['runout_history']:.2f}, height {m['height']:.2f}, kinetic energy {m['moving']:.1e} of its peak, "
-                         f"energy residual {m['residual']:.3f} %, {m['particles']} particles", figure="v_exp_3_runout.png")
+        case.record(
+            f"{kind}, a = {a:g}: run-out",
+            f"{min(laws.values()):.2f} to {max(laws.values()):.2f} (laws)",
+            m["runout"],
+            "L0",
+            seconds=m["seconds"],
+            note=f"outermost grain {m['runout_history']:.2f}, height {m['height']:.2f}, kinetic energy {m['moving']:.1e} of its peak, "
+            f"energy residual {m['residual']:.3f} %, {m['particles']} particles",
+            figure="collapsing_columns_runout.png",
+        )
     case.curve(f"{kind}", **{k: np.array([m[k] for m in rows]) for k in ("a", "runout", "runout_history", "height", "moving", "seconds")})
     for m in rows:
         case.curve(f"{kind}-profile-{m['a']:g}", x=m["at"], z=m["profile"])
     below, above = [m for m in rows if m["a"] < BREAK[kind]], [m for m in rows if m["a"] > BREAK[kind]]
     for name, part, power in (("below", below, 1.0), ("above", above, POWER[kind])):
         e = exponent(part)
-        case.record(f"{kind}: exponent of the run-out {name} the break", power, e, "1", "+-0.15", abs(e - power) <= 0.15,
-                    note="fitted to a = " + ", ".join(f"{m['a']:g}" for m in part), seconds=sum(m["seconds"] for m in part), figure="v_exp_3_runout.png")
+        case.record(
+            f"{kind}: exponent of the run-out {name} the break",
+            power,
+            e,
+            "1",
+            "+-0.15",
+            abs(e - power) <= 0.15,
+            note="fitted to a = " + ", ".join(f"{m['a']:g}" for m in part),
+            seconds=sum(m["seconds"] for m in part),
+            figure="collapsing_columns_runout.png",
+        )
     return rows
 
 
@@ -156,17 +219,27 @@ def draw(case, swept):
     panels = []
     a = np.geomspace(0.4, 25, 120)
     for kind, rows in swept.items():
-        curves = case.curve(kind, **{k: np.array([m[k] for m in rows]) for k in ("a", "runout", "runout_history", "height", "moving", "seconds")})
+        curves = case.curve(
+            kind, **{k: np.array([m[k] for m in rows]) for k in ("a", "runout", "runout_history", "height", "moving", "seconds")}
+        )
         for what, laws, column in (("run-out (front - L0)/L0", RUNOUT[kind], 2), ("height H/L0", HEIGHT[kind], 4)):
             plots = []
             for colour, (name, f) in zip(COLOURS[1:], laws.items()):
-                file = case.curve(f"law-{kind}-{column}-{name.split(',')[0].replace(' ', '-')}", a=a, y=np.asarray(f(a), float) * np.ones_like(a))
+                file = case.curve(
+                    f"law-{kind}-{column}-{name.split(',')[0].replace(' ', '-')}", a=a, y=np.asarray(f(a), float) * np.ones_like(a)
+                )
                 plots.append(f"'{file}' every ::1 u 1:2 w l lw 1.6 lc rgb '{colour}' t '{name}'")
             plots.append(f"'{curves}' every ::1 u 1:{column} w p pt 7 ps 1.1 lc rgb '{COLOURS[0]}' t 'kuzure'")
-            panels.append(f"set title '{'plane strain' if kind == 'plane' else 'axisymmetric'}'; set ylabel '{what}'; plot " + ", ".join(plots))
+            panels.append(
+                f"set title '{'plane strain' if kind == 'plane' else 'axisymmetric'}'; set ylabel '{what}'; plot " + ", ".join(plots)
+            )
     rows_of_panels = len(swept)
-    figure("v_exp_3_runout", f"set multiplot layout {rows_of_panels},2\nset logscale xy; set xrange [0.4:25]; set xlabel 'aspect ratio a = H0/L0'\n"
-           "set key bottom right font ',9' spacing 1\n" + "\n".join(panels) + "\nunset multiplot\n", size=(980, 420 * rows_of_panels))
+    figure(
+        "collapsing_columns_runout",
+        f"set multiplot layout {rows_of_panels},2\nset logscale xy; set xrange [0.4:25]; set xlabel 'aspect ratio a = H0/L0'\n"
+        "set key bottom right font ',9' spacing 1\n" + "\n".join(panels) + "\nunset multiplot\n",
+        size=(980, 420 * rows_of_panels),
+    )
 
 
 def main(quick=False, slow=False):

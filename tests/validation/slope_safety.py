@@ -36,13 +36,28 @@ def scene(srf, cone, across=20, **changes):
         "dimensions": 2,
         "space": {"spacing": dx, "h": 1.5},
         "time": {"end": SETTLE + FREE},
-        "soil": {"soil": {"density": 20000.0 / GRAVITY, "young": YOUNG, "poisson": 0.3, "cohesion": 10000.0 / srf,
-                          "friction_angle": float(np.degrees(np.arctan(np.tan(np.radians(20.0)) / srf))), "dilation_angle": 0.0, "cone": cone}},
+        "soil": {
+            "soil": {
+                "density": 20000.0 / GRAVITY,
+                "young": YOUNG,
+                "poisson": 0.3,
+                "cohesion": 10000.0 / srf,
+                "friction_angle": float(np.degrees(np.arctan(np.tan(np.radians(20.0)) / srf))),
+                "dilation_angle": 0.0,
+                "cone": cone,
+            }
+        },
         "body": [{"soil": "soil", "polygon": {"points": [[0.0, 0.0], [3.2 * H, 0.0], [1.2 * H, H], [0.0, H]]}, "stress": "at rest"}],
-        "wall": [{"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [6 * H, 0.0, 0.0]}},
-                 {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 1.2 * H]}}],
-        "effects": {"gravity": [0.0, 0.0, -GRAVITY], "viscosity": {"alpha": 0.1, "beta": 0.0}, "artificial_stress": "auto",
-                    "damping": {"ratio": 1.0, "until": SETTLE}},
+        "wall": [
+            {"surface": "rough", "box": {"low": [-4 * dx, 0.0, -4 * dx], "high": [6 * H, 0.0, 0.0]}},
+            {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 1.2 * H]}},
+        ],
+        "effects": {
+            "gravity": [0.0, 0.0, -GRAVITY],
+            "viscosity": {"alpha": 0.1, "beta": 0.0},
+            "artificial_stress": "auto",
+            "damping": {"ratio": 1.0, "until": SETTLE},
+        },
         "accuracy": {"kernel": "wendland c2"},
         "output": {"every": 0.5, "history": 0.2, "fields": ["displacement", "plastic_strain"]},
     }
@@ -56,8 +71,14 @@ def measure(result):
     d = np.array([np.linalg.norm(result.snapshot(k)["displacement"] - settled, axis=1).max() for k in range(first, count)])
     accelerates = bool(d[2] > 2 * d[1])
     still = bool(d[-1] - d[-5] < 1e-5 * H)  # over the last two seconds
-    return {"d": d, "time": 0.5 * np.arange(len(d)), "end": float(d[-1]), "failed": accelerates and bool(d[2] > 1e-4 * H), "still": still,
-            "seconds": result.seconds}
+    return {
+        "d": d,
+        "time": 0.5 * np.arange(len(d)),
+        "end": float(d[-1]),
+        "failed": accelerates and bool(d[2] > 1e-4 * H),
+        "still": still,
+        "seconds": result.seconds,
+    }
 
 
 def slides(done, limit=0.05 * H):
@@ -94,7 +115,9 @@ def draw(case, swept):
     for colour, m in zip(COLOURS, swept[0][2]):
         file = case.curve(f"time-{m['srf']:.4f}", time_s=m["time"], displacement_m=m["d"])
         times.append(f"'{file}' every ::1 u 1:($2>0?$2:1/0) w l lw 1.8 lc rgb '{colour}' t 'SRF {m['srf']:.3f}'")
-    figure("v_exp_4_slope", f"""set multiplot layout 1,2
+    figure(
+        "slope_safety",
+        f"""set multiplot layout 1,2
 set logscale y; set format y '10^{{%L}}'; set ylabel 'greatest displacement {FREE:g} s after damping (m)'; set xlabel 'strength reduction factor SRF'
 set xrange [1.15:2.05]; set yrange [1e-4:100]; set key top left font ',9'; set title 'Slope of Griffiths and Lane, example 1'
 set arrow from {CHART},1e-4 to {CHART},2 nohead dt 2 lw 1.4 lc rgb 'black'; set label 'chart {CHART:.2f}' at {CHART},2e-4 offset 0.5,0 font ',9'
@@ -105,7 +128,9 @@ unset arrow; unset label; set xrange [0:8]; set yrange [1e-3:100]
 set key top left font ',9'; set xlabel 'time since the end of damping (s)'; set ylabel 'greatest displacement (m)'; set title '{swept[0][0]}'
 plot {', '.join(times)}
 unset multiplot
-""", size=(1000, 440))
+""",
+        size=(1000, 440),
+    )
 
 
 def main(quick=False, slow=False):
@@ -113,38 +138,96 @@ def main(quick=False, slow=False):
     psi0 = CONES[0]
     if quick:
         below, above = at(1.30, psi0, 20), at(1.45, psi0, 20)
-        case.record("SRF 1.30 holds (cone plane strain, no dilation, H/dx 20)", "holds", "fails" if below["failed"] else "holds", "", "", not below["failed"],
-                    seconds=below["seconds"], note=f"greatest displacement {below['end']:.1e} m")
-        case.record("SRF 1.45 fails", "fails", "fails" if above["failed"] else "holds", "", "", above["failed"], seconds=above["seconds"],
-                    note=f"greatest displacement {above['end']:.1e} m")
+        case.record(
+            "SRF 1.30 holds (cone plane strain, no dilation, H/dx 20)",
+            "holds",
+            "fails" if below["failed"] else "holds",
+            "",
+            "",
+            not below["failed"],
+            seconds=below["seconds"],
+            note=f"greatest displacement {below['end']:.1e} m",
+        )
+        case.record(
+            "SRF 1.45 fails",
+            "fails",
+            "fails" if above["failed"] else "holds",
+            "",
+            "",
+            above["failed"],
+            seconds=above["seconds"],
+            note=f"greatest displacement {above['end']:.1e} m",
+        )
         wrong = at(1.45, "compression", 20)
-        case.control("compression cone at SRF 1.45: must hold, so the test sees the cone", not wrong["failed"], "fails" if wrong["failed"] else "holds",
-                     seconds=wrong["seconds"])
+        case.control(
+            "compression cone at SRF 1.45: must hold, so the test sees the cone",
+            not wrong["failed"],
+            "fails" if wrong["failed"] else "holds",
+            seconds=wrong["seconds"],
+        )
         return case.done()
     fos, swept = {}, []
     for cone in CONES:
         fos[cone], done = factor(cone, 20, 1.2, 2.0)
         swept.append((cone + ", H/dx 20", cone.replace(", ", "-").replace(" ", "-") + "-20", done))
         reference = CHART if cone == psi0 else PREDICTED[cone]
-        case.within(f"factor of safety, cone {cone}, H/dx 20", reference, fos[cone], "1", 3, seconds=sum(m["seconds"] for m in done),
-                    note=f"reference: {'chart (Bishop-Morgenstern)' if cone == psi0 else 'predicted from the chart and the cone'}; "
-                         f"slides more than 0.05 H at SRF {slides(done):.3f}; {len(done)} runs",
-                    figure="v_exp_4_slope.png")
-    case.control("compression cone against the chart's 1.38: factor of safety outside 3 %", abs(fos["compression"] - CHART) > 0.03 * CHART, fos["compression"])
+        case.within(
+            f"factor of safety, cone {cone}, H/dx 20",
+            reference,
+            fos[cone],
+            "1",
+            3,
+            seconds=sum(m["seconds"] for m in done),
+            note=f"reference: {'chart (Bishop-Morgenstern)' if cone == psi0 else 'predicted from the chart and the cone'}; "
+            f"slides more than 0.05 H at SRF {slides(done):.3f}; {len(done)} runs",
+            figure="slope_safety.png",
+        )
+    case.control(
+        "compression cone against the chart's 1.38: factor of safety outside 3 %",
+        abs(fos["compression"] - CHART) > 0.03 * CHART,
+        fos["compression"],
+    )
     stiff = [at(fos[psi0] + side, psi0, 20, "-stiff", **{"soil.young": 1e8}) for side in (-0.025, 0.025)]
-    case.record("published E = 1e5 kPa: the failure lies between the same SRF", "holds, fails", ", ".join("fails" if m["failed"] else "holds" for m in stiff), "",
-                f"FOS of the softer soil +-0.025", [m["failed"] for m in stiff] == [False, True], seconds=sum(m["seconds"] for m in stiff))
+    case.record(
+        "published E = 1e5 kPa: the failure lies between the same SRF",
+        "holds, fails",
+        ", ".join("fails" if m["failed"] else "holds" for m in stiff),
+        "",
+        "FOS of the softer soil +-0.025",
+        [m["failed"] for m in stiff] == [False, True],
+        seconds=sum(m["seconds"] for m in stiff),
+    )
     fine, done = factor(psi0, 40, fos[psi0] - 0.05, fos[psi0] + 0.05)
     swept.insert(0, (psi0 + ", H/dx 40", "plane-strain-no-dilation-40", done))
-    case.within(f"factor of safety, cone {psi0}, H/dx 40", CHART, fine, "1", 3, seconds=sum(m["seconds"] for m in done),
-                note=f"drift from H/dx 20: {fine - fos[psi0]:+.4f}; slides more than 0.05 H at SRF {slides(done):.3f}", figure="v_exp_4_slope.png")
+    case.within(
+        f"factor of safety, cone {psi0}, H/dx 40",
+        CHART,
+        fine,
+        "1",
+        3,
+        seconds=sum(m["seconds"] for m in done),
+        note=f"drift from H/dx 20: {fine - fos[psi0]:+.4f}; slides more than 0.05 H at SRF {slides(done):.3f}",
+        figure="slope_safety.png",
+    )
     # Hard case H13: a slope far from failure must not creep, whatever the kernel.
-    for label, changes in (("Wendland C2, h 1.5", {}), ("Wendland C2, h 1.3 (the default)", {"space.h": 1.3}), ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
-                           ("cubic spline, h 1.3", {"space.h": 1.3, "accuracy.kernel": "cubic spline"}),
-                           ("cubic spline, h 1.5", {"accuracy.kernel": "cubic spline"})):
+    for label, changes in (
+        ("Wendland C2, h 1.5", {}),
+        ("Wendland C2, h 1.3 (the default)", {"space.h": 1.3}),
+        ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
+        ("cubic spline, h 1.3", {"space.h": 1.3, "accuracy.kernel": "cubic spline"}),
+        ("cubic spline, h 1.5", {"accuracy.kernel": "cubic spline"}),
+    ):
         m = at(1.0, psi0, 20, "-rest-" + label.split("(")[0].strip().replace(", ", "-").replace(" ", "-"), **changes)
-        case.record(f"stable slope (SRF 1) at rest, {label}: displacement after {FREE:g} s", 0.0, m["end"], "m", "< 0.1 spacings, at rest at the end",
-                    m["end"] < 0.1 * H / 20 and m["still"], seconds=m["seconds"], note=f"moved {m['d'][-1] - m['d'][-5]:.1e} m in the last 2 s")
+        case.record(
+            f"stable slope (SRF 1) at rest, {label}: displacement after {FREE:g} s",
+            0.0,
+            m["end"],
+            "m",
+            "< 0.1 spacings, at rest at the end",
+            m["end"] < 0.1 * H / 20 and m["still"],
+            seconds=m["seconds"],
+            note=f"moved {m['d'][-1] - m['d'][-5]:.1e} m in the last 2 s",
+        )
     draw(case, swept)
     return case.done()
 

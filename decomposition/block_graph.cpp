@@ -1,0 +1,166 @@
+// The graph of the blocks that hold soil, and what a cut of it is worth.
+#include "decomposition/partition.hpp"
+#include "decomposition/rim.hpp"
+#include "solver/core/ensure.hpp"
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace kuzure {
+
+void check_block(const BlockWork& b, const BlockGrid& grid)
+{
+    ensure(within_limit(b.block), "a block lies beyond the block limit");
+    for (int a = 0; a < 3; ++a)
+        ensure(grid.period[a] == 0 || (b.block[a] >= 0 && b.block[a] < grid.period[a]), "a block lies outside its period");
+    ensure(std::isfinite(b.work) && b.work >= 0 && std::isfinite(b.particles) && b.particles >= 0,
+           "a block's work or particle count is negative or not a number");
+}
+
+void append_links(const BlockGraph& g, const BlockIndex& index, int b, std::vector<BlockGraph::Link>& to)
+{
+    for (int code = 0; code < 27; ++code) {
+        const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
+        if (code == 13) continue;
+        Block there = g.block[b];
+        double share = 1; // of a block's particles within reach of the other block
+        for (int a = 0; a < 3; ++a) {
+            there[a] += d[a];
+            if (d[a]) share *= std::min(1.0, g.grid.reach[a]);
+        }
+        there = wrapped(there, g.grid.period);
+        const int n = within_limit(there) ? index[there] : -1;
+        if (n >= 0) to.push_back({n, d, share * g.grid.row_bytes * (g.particles[b] + g.particles[n])});
+    }
+}
+
+BlockGraph block_graph(std::span<const BlockWork> given, const BlockGrid& grid)
+{
+    for (const auto& b : given) check_block(b, grid);
+    std::vector<BlockWork> all(given.begin(), given.end());
+    std::ranges::stable_sort(all, {}, &BlockWork::block);
+
+    BlockGraph g;
+    g.grid = grid;
+    for (const auto& b : all) {
+        if (g.block.empty() || g.block.back() != b.block) {
+            g.block.push_back(b.block);
+            g.work.push_back(0);
+            g.particles.push_back(0);
+        }
+        g.work.back() += b.work;
+        g.particles.back() += b.particles;
+    }
+
+    BlockIndex index;
+    index.reserve(g.block.size());
+    for (int b = 0; b < g.size(); ++b) index.set(g.block[b], b);
+    for (int b = 0; b < g.size(); ++b) {
+        g.first.push_back(g.link.size());
+        append_links(g, index, b, g.link);
+    }
+    g.first.push_back(g.link.size());
+    return g;
+}
+
+// ---- what a cut is worth --------------------------------------------------------------------------------------------
+namespace {
+
+/// A block seen along one axis: the shares of it within reach of its low face, of its high face, of both, of none.
+struct Layer {
+    double share;
+    bool low, high;
+};
+std::array<Layer, 3> layers(double reach)
+{
+    const double r = std::min(1.0, reach);
+    if (r <= 0.5) return {{{r, true, false}, {1 - 2 * r, false, false}, {r, false, true}}};
+    return {{{1 - r, true, false}, {2 * r - 1, true, true}, {1 - r, false, true}}};
+}
+
+/// Sets of blocks of one part that hang together by faces, edges or corners, each by number, the sets by their first.
+std::vector<std::vector<int>> pieces_of(const BlockGraph& g, std::span<const int> part)
+{
+    std::vector<std::vector<int>> pieces;
+    std::vector<char> seen(g.size(), 0);
+    for (int b = 0; b < g.size(); ++b) {
+        if (std::exchange(seen[b], 1)) continue;
+        std::vector<int> piece{b};
+        for (std::size_t k = 0; k < piece.size(); ++k)
+            for (const auto& l : g.links(piece[k]))
+                if (part[l.block] == part[b] && !std::exchange(seen[l.block], 1)) piece.push_back(l.block);
+        std::ranges::sort(piece);
+        pieces.push_back(std::move(piece));
+    }
+    return pieces;
+}
+
+} // namespace
+
+CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
+{
+    ensure(int(part.size()) == g.size(), "a cut has as many entries as the graph has blocks");
+    CutReport r;
+    r.parts = parts;
+    r.blocks = g.size();
+    r.work.assign(parts, 0);
+    r.particles.assign(parts, 0);
+    r.ghosts.assign(parts, 0);
+    r.peers.assign(parts, 0);
+    for (int b = 0; b < g.size(); ++b) {
+        r.work[part[b]] += g.work[b];
+        r.particles[part[b]] += g.particles[b];
+    }
+    r.pieces.assign(parts, 0);
+    for (const auto& piece : pieces_of(g, part)) ++r.pieces[part[piece.front()]];
+    const double total = std::accumulate(r.work.begin(), r.work.end(), 0.0);
+    if (total > 0) r.imbalance = *std::ranges::max_element(r.work) * parts / total;
+
+    const auto x = layers(g.grid.reach[0]), y = layers(g.grid.reach[1]), z = layers(g.grid.reach[2]);
+    const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
+    std::vector<std::vector<int>> sends(parts);
+    struct Request {
+        int part;
+        bool image; // reaches itself or its own part through a period: each such direction is a ghost of its
+                    // own
+        std::array<std::int8_t, 3> d;
+    };
+    std::vector<Request> requests;
+    for (int b = 0; b < g.size(); ++b) {
+        requests.clear();
+        for (const auto& l : g.links(b)) {
+            bool image = false;
+            for (int a = 0; a < 3; ++a) image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
+            if (part[l.block] != part[b] || image) requests.push_back({part[l.block], image, l.d});
+        }
+        std::ranges::stable_sort(requests, {}, [](const Request& w) { return std::pair(w.part, w.image); });
+        for (std::size_t from = 0, to; from < requests.size(); from = to) {
+            to = from;
+            while (to < requests.size() && requests[to].part == requests[from].part && requests[to].image == requests[from].image) ++to;
+            double share = 0;
+            for (const auto& lx : x)
+                for (const auto& ly : y)
+                    for (const auto& lz : z)
+                        for (std::size_t w = from; w < to; ++w) {
+                            const auto& d = requests[w].d;
+                            if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2])) continue;
+                            share += lx.share * ly.share * lz.share;
+                            break;
+                        }
+            const double rows = share * g.particles[b];
+            r.ghosts[requests[from].part] += rows;
+            if (requests[from].part == part[b]) continue;
+            r.cut_bytes += rows * g.grid.row_bytes;
+            sends[part[b]].push_back(requests[from].part);
+        }
+    }
+    for (int p = 0; p < parts; ++p) {
+        std::ranges::sort(sends[p]);
+        r.peers[p] = int(std::unique(sends[p].begin(), sends[p].end()) - sends[p].begin());
+    }
+    return r;
+}
+
+} // namespace kuzure

@@ -1,0 +1,560 @@
+// The real ground of a scene, from its files.
+#include "io/ground/ground.hpp"
+#include "io/ground/crs.hpp"
+#include "io/ground/formats.hpp"
+#include "io/ground/vectors.hpp"
+#include "solver/scene/draped.hpp"
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace kuzure::io {
+namespace {
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+const double reach_slope = std::tan(11 * 3.14159265358979323846 / 180); // what flows comes to rest above this line, as nearly all have
+constexpr double most_doubtful_slope = 55;                              // deg: beyond it layers of particles lie close along the normal
+
+/// What is wrong, at a key of the scene.
+struct Refused {
+    std::string key, text;
+};
+/// What the work on a key throws, with the key.
+template <class Work> auto at_key(const std::string& key, Work work)
+{
+    try {
+        return work();
+    } catch (const BadInput& e) {
+        throw Refused{key, e.what()};
+    } catch (const IoFailed& e) {
+        throw Refused{key, e.what()};
+    }
+}
+
+/// A release with what its files say, in map coordinates.
+struct Mass {
+    scene::Release* release;
+    std::string key; // "body.0.release"
+    std::vector<Outline> outlines;
+    std::vector<scene::Ring> rings; // of all
+    Window box;                     // around it
+    // On the grid of the ground:
+    std::vector<double> thickness, bed; // NaN: none
+};
+
+struct Place {
+    int i = 0, j = 0;
+};
+
+class Loader {
+public:
+    explicit Loader(Scene& scene) : scene_(scene), terrain_(*scene.terrain) {}
+
+    scene::Issues load()
+    {
+        check_keys();
+        const auto map = terrain_.crs.empty() ? "" : at_key("terrain.crs", [&] { return crs_from(terrain_.crs, "terrain.crs"); });
+        std::vector<Path> files(terrain_.dem.begin(), terrain_.dem.end());
+        const Mosaic mosaic = at_key("terrain.dem", [&] { return Mosaic(files, map); });
+        crs_ = mosaic.crs();
+        all_ = mosaic.extent();
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+            if (auto* r = std::get_if<scene::Release>(&scene_.bodies[b].shape)) read_outline(*r, fmt::format("body.{}.release", b));
+        read_heights(mosaic);
+        for (auto& m : masses_) thickness_and_bed(m);
+        finish();
+        return std::move(issues_);
+    }
+
+private:
+    void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
+    double x_of(int i) const { return dem_.x + i * dem_.cell; }
+    double y_of(int j) const { return dem_.y + j * dem_.cell; }
+    std::string cell_text(int i, int j) const { return fmt::format("({:.10g}, {:.10g})", x_of(i), y_of(j)); }
+    static std::string shown(const Window& w)
+    {
+        return fmt::format("x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", w.low_x, w.high_x, w.low_y, w.high_y);
+    }
+    template <class Visit> void for_each_cell(Visit visit) const
+    {
+        for (int j = 0; j < dem_.rows; ++j)
+            for (int i = 0; i < dem_.columns; ++i) visit(i, j, std::size_t(j) * std::size_t(dem_.columns) + std::size_t(i));
+    }
+
+    void check_keys()
+    {
+        need_terrain("terrain");
+        if (scene_.dimensions != 3) throw Refused{"terrain", "expected dimensions = 3 on real ground, found 2. Remedy: dimensions = 3"};
+        if (terrain_.surface == scene::Surface::Coulomb && terrain_.friction_angle == 0)
+            throw Refused{"terrain.friction",
+                          "expected the friction angle between soil and ground in degrees, found none. Remedy: friction = 24.0, or "
+                          "surface = \"rough\" or \"smooth\""};
+        if (terrain_.surface != scene::Surface::Coulomb && terrain_.friction_angle != 0)
+            throw Refused{"terrain.friction", "expected no angle beside a rough or smooth surface. Remedy: leave friction out, or surface"};
+        if (terrain_.dem.empty()) throw Refused{"terrain.dem", "expected the file of an elevation model, or several, found none"};
+        if (const auto& w = terrain_.window; w && !((*w)[0] < (*w)[2] && (*w)[1] < (*w)[3]))
+            throw Refused{"terrain.window",
+                          fmt::format("expected [x from, y from, x to, y to] with growing x and y, found [{}, {}, {}, {}]", (*w)[0],
+                                      (*w)[1], (*w)[2], (*w)[3])};
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+            const auto* r = std::get_if<scene::Release>(&scene_.bodies[b].shape);
+            if (!r) continue;
+            const auto key = fmt::format("body.{}.release", b);
+            const int ways = int(r->thickness.has_value()) + int(!r->thickness_map.empty()) + int(!r->surface.empty()) +
+                             int(!r->before.empty() || !r->after.empty());
+            if (ways > 1)
+                throw Refused{key, "expected one of thickness, thickness_map, surface, before with after; found more. Remedy: keep one"};
+            if (ways == 0 && r->outline.empty())
+                throw Refused{key, "expected how thick the mass is: thickness, thickness_map, surface, or before and after; found none"};
+            if (r->before.empty() != r->after.empty())
+                throw Refused{key + (r->before.empty() ? ".after" : ".before"),
+                              "expected before and after together, found one. Remedy: name the other elevation model, or surface = "
+                              "\"slip.tif\" for the slip surface"};
+            if (r->thickness && r->outline.empty())
+                throw Refused{key + ".thickness",
+                              "expected an outline with a thickness, found none. Remedy: outline = \"scar.shp\", or thickness_map"};
+            if (r->on_top && (!r->surface.empty() || !r->before.empty()))
+                throw Refused{key + ".on_top", "expected on_top with thickness or thickness_map alone: surface, before and after say "
+                                               "themselves where the bed is. Remedy: leave it out"};
+        }
+    }
+
+    void read_outline(scene::Release& r, const std::string& key)
+    {
+        Mass m{&r, key, {}, {}, {}, {}, {}};
+        const double far = std::numeric_limits<double>::infinity();
+        m.box = {far, far, -far, -far};
+        const auto widen = [&](double x, double y) {
+            m.box = {std::min(m.box.low_x, x), std::min(m.box.low_y, y), std::max(m.box.high_x, x), std::max(m.box.high_y, y)};
+        };
+        if (!r.outline.empty())
+            at_key(key + ".outline", [&] {
+                auto read = read_outlines(r.outline);
+                const auto own = crs_for(read.crs, crs_, r.outline);
+                std::optional<Transform> way;
+                if (!same_crs(own, crs_)) way.emplace(own, crs_, r.outline);
+                for (auto& outline : read.features)
+                    for (auto& ring : outline.rings)
+                        for (auto& p : ring) {
+                            if (way) p = (*way)(p[0], p[1]);
+                            if (!std::isfinite(p[0]))
+                                throw BadInput(fmt::format("{}: a corner cannot be brought into {}. Remedy: check the outline's system",
+                                                           r.outline, crs_name(crs_)));
+                            widen(p[0], p[1]);
+                        }
+                const bool by_feature = !r.thickness && r.thickness_map.empty() && r.surface.empty() && r.before.empty();
+                for (std::size_t k = 0; k < read.features.size(); ++k) {
+                    if (by_feature && !read.features[k].thickness)
+                        throw BadInput(fmt::format("{}: feature {}: it has no attribute \"thickness\", and the scene no thickness. Remedy: "
+                                                   "thickness = 4.5 beside outline, or "
+                                                   "the attribute for every feature",
+                                                   r.outline, k + 1));
+                    if (by_feature && !(*read.features[k].thickness > 0))
+                        throw BadInput(fmt::format("{}: feature {}: expected a thickness above 0, found {}", r.outline, k + 1,
+                                                   *read.features[k].thickness));
+                    m.rings.insert(m.rings.end(), read.features[k].rings.begin(), read.features[k].rings.end());
+                }
+                m.outlines = std::move(read.features);
+                if (!m.box.meets(all_)) {
+                    const Window turned{m.box.low_y, m.box.low_x, m.box.high_y, m.box.high_x};
+                    throw BadInput(fmt::format(
+                        "{}: it lies at {}, the elevation model at {}: they do not overlap.{} Remedy: check the systems of both", r.outline,
+                        shown(m.box), shown(all_),
+                        turned.meets(all_) ? " With x and y exchanged they would: are its axes in another order?" : ""));
+                }
+                return 0;
+            });
+        else {
+            const auto& [file, which] = !r.thickness_map.empty() ? std::pair(r.thickness_map, ".thickness_map")
+                                        : !r.surface.empty()     ? std::pair(r.surface, ".surface")
+                                                                 : std::pair(r.after, ".after");
+            at_key(key + which, [&] {
+                const Mosaic one({file}, crs_);
+                m.box = one.extent();
+                if (!m.box.meets(all_))
+                    throw BadInput(
+                        fmt::format("{}: it lies at {}, the elevation model at {}: they do not overlap. Remedy: check the systems of both",
+                                    file, shown(m.box), shown(all_)));
+                if (!r.thickness_map.empty()) { // only where there is soil
+                    const auto g = one.read({});
+                    m.box = {far, far, -far, -far};
+                    for (int j = 0; j < g.rows; ++j)
+                        for (int i = 0; i < g.columns; ++i)
+                            if (g.at(i, j) > 0)
+                                widen(g.x + (i - 0.5) * g.cell, g.y + (j - 0.5) * g.cell),
+                                    widen(g.x + (i + 0.5) * g.cell, g.y + (j + 0.5) * g.cell);
+                    if (!(m.box.low_x < m.box.high_x)) throw BadInput(fmt::format("{}: no cell of it is thicker than 0", file));
+                }
+                return 0;
+            });
+        }
+        masses_.push_back(std::move(m));
+    }
+
+    /// The window of the scene, or what lies within the reach of its releases.
+    void read_heights(const Mosaic& mosaic)
+    {
+        at_key(terrain_.window ? "terrain.window" : "terrain.dem", [&] {
+            if (terrain_.window) {
+                const auto& w = *terrain_.window;
+                dem_ = mosaic.read(Window{w[0], w[1], w[2], w[3]});
+            } else if (masses_.empty()) {
+                dem_ = mosaic.read({});
+            } else {
+                Window box = masses_[0].box;
+                for (const auto& m : masses_)
+                    box = {std::min(box.low_x, m.box.low_x), std::min(box.low_y, m.box.low_y), std::max(box.high_x, m.box.high_x),
+                           std::max(box.high_y, m.box.high_y)};
+                // The lowest ground within some way tells how far soil can come; farther ground may be lower.
+                for (double way = 200;;) {
+                    const auto margin = [&](double by) { return Window{box.low_x - by, box.low_y - by, box.high_x + by, box.high_y + by}; };
+                    const Window w = margin(way);
+                    dem_ = mosaic.read(w);
+                    const double needed = reach(box);
+                    const bool whole = w.low_x <= all_.low_x && w.low_y <= all_.low_y && w.high_x >= all_.high_x && w.high_y >= all_.high_y;
+                    if (needed <= way || whole) {
+                        // To whole multiples of ten metres, so that a little change of the outline seldom changes the window.
+                        if (const double to = 10 * std::ceil(needed / 10) + 2 * mosaic.cell(); to < way || !whole)
+                            dem_ = mosaic.read(margin(to));
+                        break;
+                    }
+                    way = std::max(1.5 * way, needed);
+                }
+            }
+            return 0;
+        });
+        if (dem_.columns < 5 || dem_.rows < 5)
+            throw Refused{terrain_.window ? "terrain.window" : "terrain.dem",
+                          fmt::format("expected at least 5 x 5 cells of ground, found {} x {}. Remedy: a larger window, or an elevation "
+                                      "model with smaller cells",
+                                      dem_.columns, dem_.rows)};
+        check_heights();
+    }
+
+    /// How far (m) soil can come from a box by the line of reach, as far as the heights read so far tell.
+    double reach(const Window& box) const
+    {
+        double top = -std::numeric_limits<double>::infinity(), low = -top;
+        for_each_cell([&](int i, int j, std::size_t k) {
+            const double z = dem_.values[k];
+            if (std::isnan(z)) return;
+            low = std::min(low, z);
+            if (x_of(i) >= box.low_x - dem_.cell && x_of(i) <= box.high_x + dem_.cell && y_of(j) >= box.low_y - dem_.cell &&
+                y_of(j) <= box.high_y + dem_.cell)
+                top = std::max(top, z);
+        });
+        return top > low ? (top - low) / reach_slope : 0;
+    }
+
+    void check_heights()
+    {
+        double low = std::numeric_limits<double>::infinity(), high = -low;
+        bool whole = true;
+        for_each_cell([&](int i, int j, std::size_t k) {
+            const double z = dem_.values[k];
+            if (std::isnan(z)) return;
+            if (z < -11000 || z > 9000)
+                throw Refused{"terrain.dem", fmt::format("{}: the cell at {} has a height of {} m, which no place on Earth has. Remedy: if "
+                                                         "it means no data: gdal_translate -a_nodata {} in.tif out.tif",
+                                                         fmt::join(terrain_.dem, ", "), cell_text(i, j), z, z)};
+            low = std::min(low, z), high = std::max(high, z);
+            whole = whole && z == std::floor(z);
+        });
+        if (!(low <= high))
+            throw Refused{terrain_.window ? "terrain.window" : "terrain.dem",
+                          fmt::format("{}: no cell at {} has a height. Remedy: another window, or files that cover it",
+                                      fmt::join(terrain_.dem, ", "), shown(extent_of(dem_)))};
+        if (low == high) warn("terrain.dem", fmt::format("all heights are {} m: is this the elevation model?", low));
+        else if (whole)
+            warn("terrain.dem", "all heights are whole metres: slopes become stairs. Remedy: an elevation model with decimals, or gdalwarp "
+                                "-r cubicspline onto coarser cells");
+        const double x = 0.5 * (all_.low_x + all_.high_x), y = 0.5 * (all_.low_y + all_.high_y);
+        if (!lies_in(crs_, x, y))
+            warn("terrain.crs",
+                 fmt::format("the elevation model lies at ({:.8g}, {:.8g}), outside the area for which {} is made{}", x, y, crs_name(crs_),
+                             lies_in(crs_, y, x) ? "; with x and y exchanged it would lie inside: are its axes in the order of surveyors?"
+                                                 : ". Remedy: check its EPSG number"));
+        if (scene_.space.spacing > 4 * dem_.cell)
+            warn("space.spacing",
+                 fmt::format(
+                     "one spacing ({} m) is {:.1f} cells of the elevation model ({} m): what the ground has between them is averaged away",
+                     scene_.space.spacing, scene_.space.spacing / dem_.cell, dem_.cell));
+    }
+
+    bool in(const Mass& m, int i, int j) const { return m.rings.empty() || inside(m.rings, x_of(i), y_of(j)); }
+
+    /// Gives cells without a value that touch cells with one the mean of these, some times over: an outline cuts between cells.
+    void extend(std::vector<double>& values, int times) const
+    {
+        for (int t = 0; t < times; ++t) {
+            auto next = values;
+            for_each_cell([&](int i, int j, std::size_t k) {
+                if (!std::isnan(values[k])) return;
+                double sum = 0;
+                int n = 0;
+                for (int b = std::max(j - 1, 0); b <= std::min(j + 1, dem_.rows - 1); ++b)
+                    for (int a = std::max(i - 1, 0); a <= std::min(i + 1, dem_.columns - 1); ++a) {
+                        const double x = values[std::size_t(b) * std::size_t(dem_.columns) + std::size_t(a)];
+                        if (!std::isnan(x)) sum += x, ++n;
+                    }
+                if (n > 0) next[k] = sum / n;
+            });
+            values = std::move(next);
+        }
+    }
+
+    void thickness_and_bed(Mass& m)
+    {
+        scene::Release& r = *m.release;
+        const std::size_t n = dem_.values.size();
+        const auto& z = dem_.values;
+        m.bed.assign(n, none);
+        const auto read = [&](const std::string& which, const std::string& file) {
+            return at_key(m.key + which, [&] { return onto(file, dem_, crs_); });
+        };
+        // The outline must lie on ground, with a cell around it for the slopes.
+        if (!m.rings.empty()) {
+            const Window w = extent_of(dem_);
+            const double rim = 2 * dem_.cell;
+            for (const auto& ring : m.rings)
+                for (const auto& p : ring)
+                    if (p[0] < w.low_x + rim || p[0] > w.high_x - rim || p[1] < w.low_y + rim || p[1] > w.high_y - rim)
+                        throw Refused{m.key + ".outline",
+                                      fmt::format("{}: its corner ({:.10g}, {:.10g}) lies outside the ground, or within two cells of its "
+                                                  "edge ({}). Remedy: a larger window or elevation model, or another outline",
+                                                  r.outline, p[0], p[1], shown(w))};
+        }
+        const auto refuse_gap = [&](const std::string& which, const std::string& file, int i, int j) {
+            throw Refused{m.key + which, fmt::format("{}: no data at {} under the release. Remedy: fill the hole (gdal_fillnodata.py, or "
+                                                     "another file behind it in terrain.dem), or another outline",
+                                                     file, cell_text(i, j))};
+        };
+        const auto dem_file = fmt::format("{}", fmt::join(terrain_.dem, ", "));
+        std::vector<double> t(n, none); // m, NaN: not known
+        if (r.thickness) {
+            std::fill(t.begin(), t.end(), *r.thickness);
+        } else if (!r.thickness_map.empty()) {
+            t = read(".thickness_map", r.thickness_map);
+            for_each_cell([&](int i, int j, std::size_t k) {
+                if (t[k] < 0)
+                    throw Refused{m.key + ".thickness_map", fmt::format("{}: expected thicknesses from 0, found {} m at {}. Remedy: "
+                                                                        "gdal_calc.py, or declare it no data: gdal_translate -a_nodata {}",
+                                                                        r.thickness_map, t[k], cell_text(i, j), t[k])};
+            });
+        } else if (!r.surface.empty()) {
+            const auto slip = read(".surface", r.surface);
+            for_each_cell([&](int i, int j, std::size_t k) {
+                if (m.rings.empty() ? std::isnan(slip[k]) : !in(m, i, j)) {
+                    if (!std::isnan(slip[k]) && !std::isnan(z[k])) t[k] = std::max(0.0, z[k] - slip[k]);
+                    return;
+                }
+                if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
+                if (std::isnan(slip[k])) refuse_gap(".surface", r.surface, i, j);
+                if (!m.rings.empty() && slip[k] > z[k] + 0.5)
+                    throw Refused{m.key + ".surface",
+                                  fmt::format("{}: the slip surface lies {:.2f} m above the ground at {}, inside the outline: a thickness "
+                                              "below 0. Remedy: check the heights of both, or the outline",
+                                              r.surface, slip[k] - z[k], cell_text(i, j))};
+                t[k] = std::max(0.0, z[k] - slip[k]);
+                if (t[k] > 0) m.bed[k] = slip[k];
+            });
+        } else if (!r.before.empty()) {
+            const auto before = read(".before", r.before), after = read(".after", r.after);
+            double square = 0;
+            std::size_t outside = 0;
+            for_each_cell([&](int i, int j, std::size_t k) {
+                const bool here = !m.rings.empty() && in(m, i, j);
+                if (here && std::isnan(before[k])) refuse_gap(".before", r.before, i, j);
+                if (here && std::isnan(after[k])) refuse_gap(".after", r.after, i, j);
+                if (std::isnan(before[k]) || std::isnan(after[k])) return;
+                const double d = before[k] - after[k];
+                if (!here && !m.rings.empty()) square += d * d, ++outside;
+                t[k] = std::max(0.0, d);
+                if (here || (m.rings.empty() && d > 0)) m.bed[k] = after[k];
+            });
+            if (outside > 0 && std::sqrt(square / double(outside)) > 0.5)
+                warn(m.key, fmt::format("before and after differ by {:.2f} m (root mean square) outside the outline too: one is shifted, "
+                                        "or has trees, or the deposit is in the window",
+                                        std::sqrt(square / double(outside))));
+        } else {
+            for_each_cell([&](int i, int j, std::size_t k) {
+                for (const auto& o : m.outlines)
+                    if (std::isnan(t[k]) && inside(o.rings, x_of(i), y_of(j))) t[k] = *o.thickness;
+            });
+        }
+
+        // Inside, ground must be known; the bed follows.
+        double sum = 0, thickest = 0;
+        std::size_t cells = 0;
+        for_each_cell([&](int i, int j, std::size_t k) {
+            const bool here = m.rings.empty() ? t[k] > 0 : in(m, i, j);
+            if (!here) return;
+            if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
+            if (std::isnan(t[k]) && !r.thickness_map.empty()) refuse_gap(".thickness_map", r.thickness_map, i, j);
+            if (std::isnan(t[k]) || !(t[k] > 0)) return;
+            sum += t[k], ++cells, thickest = std::max(thickest, t[k]);
+            if (std::isnan(m.bed[k])) m.bed[k] = r.on_top ? z[k] : z[k] - t[k];
+        });
+        if (cells == 0)
+            throw Refused{
+                m.key, !r.before.empty() ? "the ground is nowhere lower after than before: no mass. Remedy: are before and after exchanged?"
+                       : !r.surface.empty() ? "the slip surface is nowhere below the ground: no mass. Remedy: check the heights of both"
+                                            : "no cell of the elevation model lies inside: no mass. Remedy: an elevation model with "
+                                              "smaller cells, or a larger outline"};
+        const double a = double(cells) * dem_.cell * dem_.cell, volume = sum * dem_.cell * dem_.cell, mean = volume / a;
+        if (const double share = volume / std::pow(a, 1.5); share < 0.003 || share > 0.5)
+            warn(m.key, fmt::format("a volume of {:.3g} m^3 on {:.3g} m^2 (mean thickness {:.2f} m) is {:.1f} % of area^1.5, where slides "
+                                    "have about 1 to 20 %: check outline and thickness",
+                                    volume, a, mean, 100 * share));
+        if (dem_.cell > thickest)
+            warn("terrain.dem",
+                 fmt::format("its cells ({} m) are coarser than the release is thick ({:.2f} m at most)", dem_.cell, thickest));
+        if (mean < 6 * scene_.space.spacing)
+            warn("space.spacing",
+                 fmt::format(
+                     "the release is {:.1f} layers of particles thick on average; below 6 its reach is rough. Remedy: spacing = {:.2g}",
+                     mean / scene_.space.spacing, mean / 6));
+        if (!r.thickness) {
+            if (m.rings.empty()) {
+                for (double& x : t)
+                    if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
+            } else {
+                // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
+                for_each_cell([&](int i, int j, std::size_t k) {
+                    if (t[k] == 0 && !in(m, i, j)) t[k] = none;
+                });
+                extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
+            }
+        }
+        m.thickness = std::move(t);
+        check_reach(m);
+    }
+
+    /// What is missing or steep where the mass may go.
+    void check_reach(const Mass& m)
+    {
+        double top = -std::numeric_limits<double>::infinity();
+        const auto& z = dem_.values;
+        for_each_cell([&](int, int, std::size_t k) {
+            if (!std::isnan(m.bed[k])) top = std::max(top, z[k]);
+        });
+        double low = top;
+        for (const double h : z)
+            if (h < low) low = h;
+        const double way = (top - low) / reach_slope; // the farthest that soil can come
+        const Window& b = m.box;
+        std::size_t missing = 0, steep = 0, known = 0;
+        double steepest = 0;
+        Place where;
+        const auto distance = [&](double x, double y) {
+            return std::hypot(std::max({b.low_x - x, x - b.high_x, 0.0}), std::max({b.low_y - y, y - b.high_y, 0.0}));
+        };
+        for_each_cell([&](int i, int j, std::size_t k) {
+            const double d = distance(x_of(i), y_of(j));
+            if (d > way) return;
+            if (std::isnan(z[k])) {
+                ++missing;
+                return;
+            }
+            if (z[k] > top - reach_slope * d) return;
+            ++known;
+            if (i == 0 || j == 0 || i + 1 == dem_.columns || j + 1 == dem_.rows) return;
+            const double sx = (dem_.at(i + 1, j) - dem_.at(i - 1, j)) / (2 * dem_.cell),
+                         sy = (dem_.at(i, j + 1) - dem_.at(i, j - 1)) / (2 * dem_.cell);
+            const double slope = std::atan(std::hypot(sx, sy)) * 180 / 3.14159265358979323846;
+            if (slope > most_doubtful_slope) ++steep;
+            if (slope > steepest) steepest = slope, where = {i, j};
+        });
+        // Beyond the edge: cells of the circle that are not there. Only where the ground at the edge can be reached.
+        std::size_t beyond = 0;
+        const auto edge_reached = [&](int i, int j) {
+            return !std::isnan(dem_.at(i, j)) && dem_.at(i, j) <= top - reach_slope * distance(x_of(i), y_of(j));
+        };
+        std::size_t edge = 0, edges = 0;
+        for (int i = 0; i < dem_.columns; ++i) edges += 2, edge += edge_reached(i, 0), edge += edge_reached(i, dem_.rows - 1);
+        for (int j = 0; j < dem_.rows; ++j) edges += 2, edge += edge_reached(0, j), edge += edge_reached(dem_.columns - 1, j);
+        beyond = edge;
+        if (missing > 0)
+            warn("terrain.dem", fmt::format("{:.2g} % of the cells within reach of {} (the line of 11 degrees from its top) have no data: "
+                                            "soil that comes there is lost",
+                                            100 * double(missing) / double(missing + known), m.key));
+        if (beyond > 0)
+            warn(terrain_.window ? "terrain.window" : "terrain.dem",
+                 fmt::format("the edge of the ground lies within reach of {} (the line of 11 degrees from its top): {:.2g} % of its edge "
+                             "can be passed. Remedy: a larger {}",
+                             m.key, 100 * double(beyond) / double(edges), terrain_.window ? "window" : "elevation model"));
+        if (steep > 0)
+            warn("terrain.dem",
+                 fmt::format(
+                     "{} cells within reach of {} are steeper than {} degrees, up to {:.0f} at {}: layers of particles lie close there",
+                     steep, m.key, most_doubtful_slope, steepest, cell_text(where.i, where.j)));
+    }
+
+    /// Grids in local metres, the wall, the frame.
+    void finish()
+    {
+        const Window w = extent_of(dem_);
+        const double x0 = std::floor(w.low_x + 1e-6), y0 = std::floor(w.low_y + 1e-6);
+        scene_.map_frame = {crs_, x0, y0};
+        scene::Grid bed = dem_;
+        for (const auto& m : masses_)
+            for (std::size_t k = 0; k < bed.values.size(); ++k)
+                if (!std::isnan(m.bed[k])) bed.values[k] = ground::single(m.bed[k]);
+        // Where cells are finer than the spacing their means are what particles can feel.
+        const int n = std::max(1, int(std::floor(scene_.space.spacing / dem_.cell + 1e-6)));
+        const auto local = [&](scene::Grid g) {
+            g.x -= x0, g.y -= y0;
+            return scene::averaged(g, n);
+        };
+        auto heights = local(std::move(bed));
+        if (heights.columns < 5 || heights.rows < 5)
+            throw Refused{"space.spacing",
+                          fmt::format("expected ground of at least 5 x 5 spacings, found {} x {}", heights.columns, heights.rows)};
+        const auto field = std::make_shared<const scene::HeightField>(std::move(heights));
+        for (auto& m : masses_) {
+            m.release->bed = field;
+            m.release->rings = m.rings;
+            for (auto& ring : m.release->rings)
+                for (auto& p : ring) p[0] -= x0, p[1] -= y0;
+            if (m.release->thickness) continue;
+            scene::Grid t = dem_;
+            t.values = m.thickness;
+            m.release->thicknesses = std::make_shared<const scene::Grid>(local(std::move(t)));
+        }
+        std::erase_if(scene_.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
+        scene_.walls.push_back(
+            {scene::Ground{field, scene::ground_depth(*field, scene_.support())}, terrain_.surface, terrain_.friction_angle});
+    }
+
+    Scene& scene_;
+    const scene::Terrain& terrain_;
+    scene::Issues issues_;
+    std::string crs_;
+    Window all_;
+    scene::Grid dem_; // map coordinates
+    std::vector<Mass> masses_;
+};
+
+} // namespace
+
+scene::Issues load_ground(Scene& scene)
+{
+    if (!scene.terrain) {
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+            if (std::holds_alternative<scene::Release>(scene.bodies[b].shape))
+                return {{scene::Severity::Error, fmt::format("body.{}.release", b),
+                         "expected [terrain] with an elevation model beside a release, found none. Remedy: [terrain] dem = \"dem.tif\"",
+                         ""}};
+        return {};
+    }
+    try {
+        return Loader(scene).load();
+    } catch (const Refused& r) {
+        return {{scene::Severity::Error, r.key, r.text, ""}};
+    } catch (const BadInput& e) {
+        return {{scene::Severity::Error, "terrain", e.what(), ""}};
+    }
+}
+
+} // namespace kuzure::io
