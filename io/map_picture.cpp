@@ -103,7 +103,7 @@ void draw_cells(Canvas& canvas, const MapPicture& m, const View& v, const Scale&
             const double x = v.x(column), y = v.y(row), light = light_at(m, v, x, y);
             const int i = int(std::floor((x - g.x) / g.cell + 0.5)), j = int(std::floor((y - g.y) / g.cell + 0.5));
             const bool on = i >= 0 && j >= 0 && i < g.columns && j < g.rows && !std::isnan(g.at(i, j));
-            const Rgb c = lit(on ? map_color(scale.share(g.at(i, j)), has_signs(m.kind)) : plain, on ? 0.35 + 0.65 * light : light);
+            const Rgb c = lit(on ? map_color(scale.share(g.at(i, j)), has_signs(m.kind)) : plain, on ? 0.7 + 0.3 * light : light);
             to[column] = 0xff000000u | std::uint32_t(c.r) << 16 | std::uint32_t(c.g) << 8 | c.b;
         }
     }

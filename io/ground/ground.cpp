@@ -288,8 +288,8 @@ private:
             m.release->thicknesses = std::make_shared<const scene::Grid>(local(std::move(t)));
         }
         std::erase_if(scene_.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
-        scene_.walls.push_back(
-            {scene::Ground{field, scene::ground_depth(*field, scene_.support()), terrain_.lattice}, terrain_.surface, terrain_.friction_angle});
+        scene_.walls.push_back({scene::Ground{field, scene::ground_depth(*field, scene_.support()), terrain_.lattice}, terrain_.surface,
+                                terrain_.friction_angle});
     }
 
     Scene& scene_;

@@ -191,6 +191,56 @@ if shutil.which("gdalinfo") and shutil.which("gdallocationinfo"):
 else:
     print("gdal-bin is not installed: what GDAL reads was not looked at")
 
+# ---- when numbers fail the maps tell what came before; with time.retry they go back with the run
+wild = ("--force-step", "--set", "time.end=0.39", "--quiet", "--set")
+call("run", one, "-o", "broken", *wild, "time.step=0.03", expect=3)
+maps = summary("broken").get("maps", {})
+check(maps.get("time") == summary("broken")["time"] and "h_max.tif" in os.listdir(os.path.join(work, "broken", "maps")), f"a failure: {maps}")
+call("run", one, "-o", "mended", *wild, "time.step=0.03", "--set", "time.retry=true")
+call("run", one, "-o", "half", *wild, "time.step=0.015")
+check(summary("mended")["retries"] and summary("mended")["state_hash"] == summary("half")["state_hash"], "back to the start, on with half the step")
+check(digest("mended") == digest("half"), "the failed attempt is on no map")
+
+# ---- on real ground: its coordinate system, map coordinates, points of a file that names its system
+X0, Y0 = -11000.0, -12800.0
+with open(os.path.join(work, "dem.asc"), "w") as f:
+    f.write(f"ncols 60\nnrows 40\nxllcorner {X0}\nyllcorner {Y0}\ncellsize 1\nNODATA_value -9999\n")
+    f.writelines(" ".join(f"{100 - 0.6 * x:.3f}" for x in range(60)) + "\n" for _ in range(40))
+
+
+def collection(kind, coordinates, properties):
+    return json.dumps({"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::6670"}}, "features": [
+        {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}]})
+
+
+for name, text in (("scar.geojson", collection("Polygon", [[[X0 + x, Y0 + y] for x, y in ((10, 14), (18, 14), (18, 24), (10, 24), (10, 14))]], {})),
+                   ("houses.geojson", collection("Point", [X0 + 19.5, Y0 + 19.5], {"name": "mill"})),
+                   ("slide.toml", SCENE.format(dimensions=3, end=1.5, maps='[maps]\nlimits = [0.5]\npoints = "houses.geojson"')
+                    .replace("spacing = 0.1", "spacing = 0.5").replace("step = 0.004\n", "").replace("3.0e5", "3.0e6")
+                    .replace("[[wall]]\nbox = { low = [-1.0, -1.0, -0.3], high = [3.0, 2.0, 0.0] }", '[terrain]\ndem = "dem.asc"\ncrs = "EPSG:6670"\nfriction = 20.0')
+                    .replace("box = { low = [0.0, 0.0, 0.0], high = [0.6, 0.6, 0.8] }", 'release = { outline = "scar.geojson", thickness = 2.0, on_top = true }'))):
+    with open(os.path.join(work, name), "w") as f:
+        f.write(text)
+call("run", "slide.toml", "-o", "slide", "--quiet")
+maps = summary("slide")["maps"]
+check("EPSG:6670" in maps["crs"], f"the ground's system: {maps['crs']}")
+check(abs(maps["x"] - X0) <= 3 and abs(maps["y"] - Y0) <= 3 and maps["columns"] >= 52 and maps["rows"] >= 32, f"over the ground: {maps}")
+whole = maps["volume"] + maps["volume_beyond"]
+check(abs(whole / 160 - 1) < 0.03, f"160 m3 failed, {whole} m3 are there")
+mill = rows("slide", "points.csv")[0]
+check(mill["name"] == "mill" and 0 < float(mill["t_arrival"]) < 2, f"they come to the mill: {mill}")
+front = rows("slide", "front.csv")
+check(float(front[-1]["x"]) > X0 + 19 and abs(float(front[-1]["h_over_l"]) - 0.6) < 0.15, f"downhill, on a slope of 0.6: {front[-1]}")
+outline = polygons(os.path.join(work, "slide", "maps", "outline_0.5.shp"))
+check(all(X0 < x < X0 + 60 and Y0 < y < Y0 + 40 for r in outline for x, y in r), "the outline lies on the map")
+check(os.path.exists(os.path.join(work, "slide", "maps", "outline_0.5.prj")), "with its system")
+if shutil.which("gdalinfo"):
+    for name in NAMES:
+        said = json.loads(subprocess.run(["gdalinfo", "-json", f"slide/maps/{name}.tif"], capture_output=True, text=True, cwd=work).stdout)
+        check("6670" in said["coordinateSystem"]["wkt"][-20:], f"{name}: GDAL reads the ground's system")
+        place = said["geoTransform"]
+        check([place[0], place[1], place[5]] == [maps["x"], 1.0, -1.0] and place[3] == maps["y"] + maps["rows"], f"{name}: and its place, {place}")
+
 # ---- what is refused: exit 2, and nothing is written
 flat = scene("flat", maps="[maps]", dimensions=2)
 check("maps: expected dimensions = 3" in call("run", flat, "-o", "flat", expect=2).stderr, "2-D")
