@@ -308,6 +308,8 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     Forced of_i;
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
     double limit = 0, approach = 0, area = 0;
+    double nearest = 2 * s.how.h, height = 0, grip = 0; // of the nearest wall point; above its face; tan(delta) there
+    Vector out{};                                       // the face's normal
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         const Vector x_ij = i.x - soil.x[l];
         if (l == k || length(x_ij) >= 2 * s.how.h) continue;
@@ -326,6 +328,9 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
+        if (length(r) < nearest)
+            nearest = length(r), height = dot(r, face.normal) - face.depth, out = face.normal,
+            grip = wall.surface == scene::Surface::Coulomb ? std::tan(wall.friction_angle) : 0;
         if (wall.surface != scene::Surface::Coulomb) {
             held = held + crossing(wall, face, traction);
             continue;
@@ -335,7 +340,8 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
         area -= facing, approach += facing * dot(i.v, face.normal);
     }
-    Vector by_walls = (1 / i.density) * held;
+    const double sunk = i.density * std::max(0.0, -height) * std::pow(0.3 * material.c_p / s.how.h, 2);
+    Vector by_walls = (1 / i.density) * (held + sunk * out);
     // Coulomb: the wall is felt where it presses, where the particle comes nearer, or where the strain felt it. Friction is a spring of the
     // soil's shear stiffness across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (area != 0) {
@@ -344,7 +350,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
                        : kept.counted ? Forced::Contact::PulledOff
                                       : Forced::Contact::LetGo;
         if (limit > 0) of_i.pressed = length(push) / i.density;
-        limit += kept.counted ? kept.rubbing : 0;
+        limit += (kept.counted ? kept.rubbing : 0) + sunk * grip;
         if (limit < 0 && of_i.contact != Forced::Contact::LetGo && length(kept.slip) > 0) { // pulled: friction is taken back too
             const Vector n = (1 / length(push)) * push;
             Vector slip = kept.slip + dt * i.v;
