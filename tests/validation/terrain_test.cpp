@@ -236,6 +236,27 @@ TEST(Terrain, SandRestsOnWavesAndAtAStep)
     at_rest([](double x, double) { return std::clamp(x * std::tan(radians(60)), -0.45, 0.45); }, "step of 60 deg");
 }
 
+TEST(Terrain, SoilTornOpenAtTheRimOfItsPitDoesNotSink)
+{
+    // A mass cut two metres into a slope climbs over the lower rim and is torn open there: it bears no pressure, the ground holds it out.
+    Case c("terrain-pit");
+    GroundScene g;
+    g.text.spacing = 0.5, g.text.young = 1e7, g.text.end = 3.5;
+    g.text.strength = "friction_angle = 30.0";
+    g.ground =
+        heights([](double x, double y) { return -0.6 * x - (std::fabs(x) <= 6 && std::fabs(y) <= 5 ? 2 : 0); }, {-20, -15}, {40, 15}, 1.0);
+    g.outline = rectangle(0.01, 0.01, 12, 10), g.thickness = 2;
+    Simulation sim(Comm::world(), g.scene());
+    const scene::HeightField field(g.ground);
+    double deepest = 0;
+    while (!sim.finished()) {
+        sim.step();
+        if (sim.steps() % 10 == 0) each(sim, [&](Index i) { deepest = std::max(deepest, -field.nearest(position(sim, i)).distance); });
+    }
+    EXPECT_TRUE(c.at_most("depth below the ground", deepest / g.text.spacing, "spacings", 0.25));
+    EXPECT_GT(centre(sim).x, 1);
+}
+
 TEST(Terrain, ClosedEdgeEndsTheRunWhereSoilLeaves)
 {
     auto g = block(30, 10);
