@@ -21,9 +21,8 @@ protected:
         S limit;                // sum f tan(delta) n.(sigma_i grad W)
         S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
         S area;                 // sum f n.grad W of Coulomb faces
-        S nearest;              // square of the distance to the nearest wall point
-        S height, grip;         // above its face, and tan(delta) there
-        Vec3<S> out;            // the face's normal
+        S nearest, sunk;        // square of the distance to the nearest wall point; how far behind its face
+        Vec3<S> out;            // that face's normal
     };
     template <class S>
     using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
@@ -136,8 +135,7 @@ private:
             sums.approach = fma(facing, dot(velocity, m.normal), sums.approach);
             sums.area = sums.area + facing;
             const auto nearer = less(r2, sums.nearest);
-            sums.nearest = min(sums.nearest, r2), sums.height = select(nearer, m.height, sums.height);
-            sums.grip = select(nearer, slides * m.tangent, sums.grip);
+            sums.nearest = min(sums.nearest, r2), sums.sunk = select(nearer, m.sunk, sums.sunk);
             sums.out = {select(nearer, m.normal.x, sums.out.x), select(nearer, m.normal.y, sums.out.y),
                         select(nearer, m.normal.z, sums.out.z)};
         });
@@ -249,60 +247,45 @@ private:
         const auto pressure = p[field::wall_pressure];
         for (Index i = lanes.at; i < lanes.at + lanes.n; ++i) slip.set(i, Vector{}), pressure.set(i, 0.0);
     }
-    /// What walls do to each lane, m/s^2: the adjoint force, Coulomb's friction, whose slip it moves on, and what holds sunk soil out.
+    /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
     KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const
     {
         const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(rows, lanes.first);
         const U scale = U(scale_) * volume / rho;
-        const Vec3<U> held = scale * w.held;
         auto& p = *in.particles;
-        const bool coulomb = p.has(field::wall_slip);
+        const U push_out = lane_by_lane<U>([&](int k) {
+            const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][lanes.particle(k)]];
+            return hold_out(unit_ * lane(w.sunk, k), m.c_p, h_);
+        });
+        const Vec3<U> held = scale * w.held + push_out * w.out;
+        if (!p.has(field::wall_slip)) return held;
+        const auto slip = p[field::wall_slip];
+        const auto pressure = p[field::wall_pressure];
+        const auto v = std::as_const(p)[field::velocity];
         double out[3][width<U>] = {};
         const auto at = [&](U a, int k) { return lane(a, k); };
         for (int k = 0; k < lanes.n; ++k) {
             if (!(lanes.moving >> (lanes.first + k) & 1)) continue;
             const Index i = lanes.at + k;
+            const double s = at(scale, k);
+            const Vector push{s * at(w.pressing.x, k), s * at(w.pressing.y, k), s * at(w.pressing.z, k)};
+            const double held_by = s * at(w.limit, k), area = s * at(w.area, k);
+            // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
+            const bool faces = area != 0, approached = s * at(w.approach, k) > 0, pressed = held_by > 0;
+            if (!faces || !(pressed || approached)) {
+                slip.set(i, Vector{}), pressure.set(i, 0.0);
+                continue;
+            }
+            const double size = length(push);
+            const Vector normal = size > 0 ? (1 / size) * push : Vector{};
             const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
-            const double sunk = hold_out(-unit_ * at(w.height, k), m.c_p, h_);
-            Vector force = sunk * Vector{at(w.out.x, k), at(w.out.y, k), at(w.out.z, k)};
-            if (coulomb)
-                force = force + at_coulomb_faces(in, i, m,
-                                                 Contact<double>{Vector{at(w.pressing.x, k), at(w.pressing.y, k), at(w.pressing.z, k)},
-                                                                 at(w.limit, k), at(w.approach, k), at(w.area, k), sunk * at(w.grip, k)},
-                                                 at(scale, k));
-            out[0][k] = force.x, out[1][k] = force.y, out[2][k] = force.z;
+            // a spring of the soil's own shear stiffness across half a smoothing length
+            const double stiffness = pressed ? m.shear * std::fabs(area) / (0.5 * h_) : 0;
+            const auto f = return_to_coulomb(slip[i], in.dt * v[i], normal, pressed ? size : 0, held_by, stiffness);
+            slip.set(i, f.slip), pressure.set(i, pressed ? size : 0.0);
+            out[0][k] = push.x + f.force.x, out[1][k] = push.y + f.force.y, out[2][k] = push.z + f.force.z;
         }
         return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};
-    }
-    template <class S> struct Contact { // of one particle with its Coulomb faces: their sums, and the friction of what holds it out
-        Vector pressing;
-        S limit, approach, area, held_out;
-    };
-    /// Push and friction of Coulomb faces, m/s^2.
-    Vector at_coulomb_faces(const StepInput& in, Index i, const Material& m, const Contact<double>& sums, double s) const
-    {
-        auto& p = *in.particles;
-        const auto slip = p[field::wall_slip];
-        const auto pressure = p[field::wall_pressure];
-        const Vector push = s * sums.pressing;
-        const double held_by = s * sums.limit, area = s * sums.area;
-        // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
-        const bool faces = area != 0, approached = s * sums.approach > 0, pressed = held_by > 0;
-        // What the strain of this step counted, the force counts too: soil that a step pulls off the wall is pulled back once, else
-        // the wall would have stretched it for nothing. Friction carries a share of all that presses, the viscous push too.
-        const double viscous = std::as_const(p)[field::wall_pressure][i];
-        const bool counted = viscous >= 0;
-        if (!faces || !(pressed || approached || counted)) {
-            slip.set(i, Vector{}), pressure.set(i, 0.0);
-            return {};
-        }
-        const double size = length(push);
-        const Vector normal = size > 0 ? (1 / size) * push : Vector{};
-        // a spring of the soil's own shear stiffness across half a smoothing length
-        const double limit = held_by + std::max(viscous, 0.0) + sums.held_out, stiffness = m.shear * std::fabs(area) / (0.5 * h_);
-        const auto f = return_to_coulomb(slip[i], in.dt * std::as_const(p)[field::velocity][i], normal, limit, stiffness);
-        slip.set(i, f.slip), pressure.set(i, pressed ? size : 0.0);
-        return push + f.force;
     }
 };
 

@@ -187,9 +187,6 @@ struct Kept {
     Vector slip{};
     double pressed = 0;
     double plastic_strain = 0, opened = 0;
-    // What the strain of the step says to its force: whether Coulomb faces counted, and how much friction the viscous push allows, N/m^3.
-    bool counted = false;
-    double rubbing = 0;
 };
 constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
 
@@ -198,8 +195,6 @@ struct Strain {
     Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
     Vector viscous{};      // acceleration, m/s^2
     bool beside_wall = false;
-    bool counted = false; // Coulomb faces do
-    double rubbing = 0;   // friction that the viscous push allows, N/m^3
 };
 inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
 {
@@ -237,13 +232,9 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         shown.x = w.x;
         const double Pi = viscosity(*viscous, s.how.h, here, shown, mirrored);
         pressure = pressure + (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
-        if (wall.surface == scene::Surface::Coulomb)
-            of_i.rubbing -= std::tan(wall.friction_angle) * i.volume * i.density * i.density * Pi * dot(grad, face.normal);
     }
-    of_i.rubbing = std::max(of_i.rubbing, 0.0);
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
-    of_i.counted = kept.pressed > 0 || trace(sliding) < 0;
-    if (of_i.counted) of_i.L_walls = of_i.L_walls + sliding;
+    if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
@@ -294,7 +285,7 @@ struct Forced {
     double pressed = 0;
     Taken before, coming; // in the half step before and in the one to come
     std::int64_t pairs = 0;
-    enum class Contact { None, Sticks, Slides, Approached, PulledOff, LetGo } contact = Contact::None; // with Coulomb faces
+    enum class Contact { None, Sticks, Slides, Approached, LetGo } contact = Contact::None; // with Coulomb faces
 };
 /// `kept.acceleration` is the viscous one of this step; dt is its length, `next` that of the one to come, s.
 inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt,
@@ -308,8 +299,6 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     Forced of_i;
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
     double limit = 0, approach = 0, area = 0;
-    double nearest = 2 * s.how.h, height = 0, grip = 0; // of the nearest wall point; above its face; tan(delta) there
-    Vector out{};                                       // the face's normal
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         const Vector x_ij = i.x - soil.x[l];
         if (l == k || length(x_ij) >= 2 * s.how.h) continue;
@@ -328,9 +317,6 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
-        if (length(r) < nearest)
-            nearest = length(r), height = dot(r, face.normal) - face.depth, out = face.normal,
-            grip = wall.surface == scene::Surface::Coulomb ? std::tan(wall.friction_angle) : 0;
         if (wall.surface != scene::Surface::Coulomb) {
             held = held + crossing(wall, face, traction);
             continue;
@@ -340,30 +326,19 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
         area -= facing, approach += facing * dot(i.v, face.normal);
     }
-    const double sunk = i.density * std::max(0.0, -height) * std::pow(0.3 * material.c_p / s.how.h, 2);
-    Vector by_walls = (1 / i.density) * (held + sunk * out);
-    // Coulomb: the wall is felt where it presses, where the particle comes nearer, or where the strain felt it. Friction is a spring of the
-    // soil's shear stiffness across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
+    Vector by_walls = (1 / i.density) * held;
+    // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
+    // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (area != 0) {
-        of_i.contact = limit > 0      ? Forced::Contact::Sticks
-                       : approach > 0 ? Forced::Contact::Approached
-                       : kept.counted ? Forced::Contact::PulledOff
-                                      : Forced::Contact::LetGo;
-        if (limit > 0) of_i.pressed = length(push) / i.density;
-        limit += (kept.counted ? kept.rubbing : 0) + sunk * grip;
-        if (limit < 0 && of_i.contact != Forced::Contact::LetGo && length(kept.slip) > 0) { // pulled: friction is taken back too
-            const Vector n = (1 / length(push)) * push;
-            Vector slip = kept.slip + dt * i.v;
-            slip = slip - dot(slip, n) * n;
-            if (length(slip) > 0) push = push - (limit / length(slip)) * slip;
-        } else if (limit > 0 && of_i.contact != Forced::Contact::LetGo) {
-            const double stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
-            const Vector n = (1 / length(push)) * push;
+        of_i.contact = limit > 0 ? Forced::Contact::Sticks : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
+        if (limit > 0) {
+            const double size = length(push), stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
+            const Vector n = (1 / size) * push;
             Vector slip = kept.slip + dt * i.v;
             slip = slip - dot(slip, n) * n;
             if (const double trial = stiffness * length(slip); trial > limit)
                 slip = (limit / trial) * slip, of_i.contact = Forced::Contact::Slides;
-            of_i.slip = slip;
+            of_i.slip = slip, of_i.pressed = size / i.density;
             push = push - stiffness * slip;
         }
         if (of_i.contact != Forced::Contact::LetGo) by_walls = by_walls + (1 / i.density) * push;

@@ -93,7 +93,8 @@ public:
                     const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
                     to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
                                         T(wall.surface == scene::Surface::Rough), T(coulomb),
-                                        T(coulomb ? std::tan(wall.friction_angle) : 0), T(0)});
+                                        T(coulomb ? std::tan(wall.friction_angle) : 0), T(0),
+                                        T(std::holds_alternative<scene::Ground>(wall.shape))});
                 }
                 to.first[k + 1] = Index(to.faces.size());
                 if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);

@@ -37,7 +37,6 @@ protected:
     template <class S> struct StrainWalls {
         Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
         Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
-        S rubbing;                 // sum tan(delta) rho_i rho_j Pi n.grad W
         S walled;                  // not zero for a particle that feels a wall
     };
     template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
@@ -139,7 +138,6 @@ private:
                 const V approach = max(-dot(Pv, r), zero);
                 const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 sums.viscous = fma(pressure, project(m, g), sums.viscous);
-                sums.rubbing = fma(slides * m.tangent * pressure, dot(g, m.normal), sums.rubbing);
             }
         });
         widen<V>(sums, out);
@@ -172,9 +170,7 @@ private:
         if (walled) {
             const auto w = lanes_at<U, StrainWalls<U>, StrainWalls<Lane>, W>(wall_rows, lanes.first);
             const U volume = U(volume_) * soil.rho0 / rho; // a wall particle has the soil's
-            U viscous_limit = zero;                        // of friction, m/s^2
-            if constexpr (M::viscous) viscous_limit = -(per_rho * volume) * w.rubbing;
-            at_walls = wall_gradient(in, w, lanes, -factor * volume, viscous_limit);
+            at_walls = wall_gradient(in, w, lanes, -factor * volume);
             feels_wall = select(less(zero, abs(w.walled)), one, zero);
             if constexpr (M::viscous) viscous = viscous - (per_rho * volume) * w.viscous;
         }
@@ -256,20 +252,15 @@ private:
     {
         return contract(deviator(sigma), deviator(tau)) / (soil.shear + soil.shear) + trace(sigma) * trace(tau) / (U(9.0) * soil.bulk);
     }
-    /// L of the walls from their sums. A Coulomb face counts where it was pressed on at the step's start, or is approached; for the force
-    /// of this step `wall_pressure` then says what the viscous push adds to the limit of friction (m/s^2), else that it does not count: -1.
-    KUZURE_INLINE Mat3<U> wall_gradient(const StepInput& in, const StrainWalls<U>& w, const Lanes& lanes, U scale, U viscous_limit) const
+    /// L of the walls from their sums. A Coulomb face counts where it was pressed on at the step's start, or is approached.
+    KUZURE_INLINE Mat3<U> wall_gradient(const StepInput& in, const StrainWalls<U>& w, const Lanes& lanes, U scale) const
     {
         Mat3<U> L{scale * w.mirrored.x, scale * w.mirrored.y, scale * w.mirrored.z};
-        auto& p = *in.particles;
+        const auto& p = std::as_const(*in.particles);
         if (!p.has(field::wall_pressure)) return L;
         const U zero(0.0), one(1.0);
-        const U was = std::as_const(p)[field::wall_pressure].template load<U>(lanes.at);
-        const U pressed = select(less(zero, was), one, zero);
-        const U counted = select(less(scale * trace(w.sliding), zero), one, pressed);
-        const U says = select(less(zero, counted), max(viscous_limit, zero), -one);
-        p[field::wall_pressure].store(lanes.at, in.sleep == SleepStage::Frozen ? select(written<U>(lanes), says, was) : says, lanes.n);
-        const U use = counted * scale;
+        const U pressed = select(less(zero, p[field::wall_pressure].template load<U>(lanes.at)), one, zero);
+        const U use = select(less(scale * trace(w.sliding), zero), one, pressed) * scale;
         return {fma(use, w.sliding.x, L.x), fma(use, w.sliding.y, L.y), fma(use, w.sliding.z, L.z)};
     }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)

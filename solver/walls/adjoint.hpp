@@ -22,6 +22,7 @@ template <class T> struct FaceRecord {
     T coulomb; // 1 where Coulomb's law holds
     T tangent; // tan(friction angle)
     T last;    // 1 for the last face of its point
+    T holds;   // 1 where sunk soil is held out: real ground
 };
 
 /// Points of one wall as the pair loop reads them, and the faces of each.
@@ -36,7 +37,7 @@ template <class V> struct Mirror {
     Vec3<V> normal;
     V factor; // (v_i - v_j)/v_i of what is mirrored
     V stick, coulomb, tangent;
-    V height; // of the particle above the face, in the unit of the pair sums; negative behind it
+    V sunk; // of the particle behind the face where sunk soil is held out, in the unit of the pair sums; else 0
 };
 
 /// Law: a wall point moves as the particle's mirror image, v_j = -v_i of what is mirrored, f = 2. Summed over the particles on one side and
@@ -52,7 +53,7 @@ template <class Law, class V, class T> KUZURE_INLINE Mirror<V> mirror(const Law&
     const auto of = [&](const FaceRecord<T>& f) {
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
         const V along = dot(r, n), depth(f.depth);
-        return Mirror<V>{n, law.factor(along, depth), V(f.stick), V(f.coulomb), V(f.tangent), along - depth};
+        return Mirror<V>{n, law.factor(along, depth), V(f.stick), V(f.coulomb), V(f.tangent), V(f.holds) * max(depth - along, V(T(0)))};
     };
     Mirror<V> m = of(*face);
     if (face->last != T(0)) return m;
@@ -65,15 +66,14 @@ template <class Law, class V, class T> KUZURE_INLINE Mirror<V> mirror(const Law&
         m.normal = {select(use, next.normal.x, m.normal.x), select(use, next.normal.y, m.normal.y), select(use, next.normal.z, m.normal.z)};
         m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
         m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
-        m.height = select(use, next.height, m.height);
+        m.sunk = select(use, next.sunk, m.sunk);
         settled = settled + take;
     } while (face->last == T(0));
     return m;
 }
-/// Acceleration (m/s^2) along the surface's normal of soil that lies `depth` (m) behind the face of the wall point nearest to it. Soil torn
-/// open bears no pressure, so no wall could hold it: a spring of its own does, omega = 0.3 c_p/h, stiff enough to stop a Mach of 0.1 within
-/// half a spacing.
-inline double hold_out(double depth, double c_p, double h) { return depth > 0 ? 0.09 * (c_p / h) * (c_p / h) * depth : 0; }
+/// Acceleration (m/s^2) along the normal of real ground of soil that lies `depth` (m) behind the face of the wall point nearest to it. Soil
+/// torn open bears no pressure, so no wall could hold it: a spring of its own does, omega = 0.3 c_p/h.
+inline double hold_out(double depth, double c_p, double h) { return 0.09 * (c_p / h) * (c_p / h) * depth; }
 /// P a: all of a at a rough wall, else its normal part.
 template <class V> KUZURE_INLINE Vec3<V> project(const Mirror<V>& m, Vec3<V> a)
 {

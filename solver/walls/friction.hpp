@@ -11,18 +11,13 @@ struct Friction {
     Vector slip, force;
 };
 
-/// `moved`: displacement of the step (m); `normal`: of the surface; `limit`: the largest friction, tan(delta) times what presses (N/m^3);
-/// `stiffness`: of the spring, N/m^4. A negative limit takes back what the surface pressed too much before soil came off it: friction
-/// along the slip remembered until then is taken back with it, so that its mean is tan(delta) times the mean load.
-inline Friction return_to_coulomb(Vector slip, Vector moved, Vector normal, double limit, double stiffness)
+/// `moved`: displacement of the step (m); `pressure`: force density with which the surface holds the particle along `normal`, `limit`:
+/// the largest friction (both N/m^3, 0 where contact is lost); `stiffness`: of the spring, N/m^4.
+inline Friction return_to_coulomb(Vector slip, Vector moved, Vector normal, double pressure, double limit, double stiffness)
 {
-    if (limit == 0 || !(stiffness > 0)) return {};
+    if (!(pressure > 0) || !(limit > 0) || !(stiffness > 0)) return {};
     Vector s = slip + moved;
     s = s - dot(s, normal) * normal;
-    if (limit < 0) {
-        const double l = length(s);
-        return {{}, l > 0 && dot(slip, slip) > 0 ? (-limit / l) * s : Vector{}};
-    }
     const double trial = stiffness * length(s);
     if (trial > limit) s = (limit / trial) * s;
     return {s, -stiffness * s};

@@ -108,16 +108,20 @@ one = scene("one")
 call("run", one, "-o", "one", "--threads", "1", "--quiet")
 want = digest("one")
 OUTLINES = {f"outline_{limit}.{ending}" for limit in ("0.15", "0.4") for ending in ("shp", "shx", "dbf")}
-check({n + ".tif" for n in NAMES} | {n + ".qml" for n in NAMES} | OUTLINES | {"front.csv", "points.csv", "h_max.png", "t_arrival.png"}
-      == {n for n in want if not n.endswith((".cpg", ".prj"))}, f"one file a map, its style, outlines, front and points, and nothing half written: {sorted(want)}")
+check(
+    {n + ".tif" for n in NAMES} | {n + ".qml" for n in NAMES} | OUTLINES | {"front.csv", "points.csv", "h_max.png", "t_arrival.png"}
+    == {n for n in want if not n.endswith((".cpg", ".prj"))},
+    f"one file a map, its style, outlines, front and points, and nothing half written: {sorted(want)}",
+)
 
 # ---- the same bytes whatever the ranks, threads and stops
 for ranks, threads in ((1, 2), (2, 1), (4, 1)):
     call("run", one, "-o", f"r{ranks}t{threads}", "--threads", str(threads), "--quiet", ranks=ranks)
     check(digest(f"r{ranks}t{threads}") == want, f"{ranks} ranks with {threads} threads: the same bytes of every map")
 stopped = scene("stopped")
-half = subprocess.Popen([program, "run", stopped, "-o", "stopped", "--threads", "1"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                        cwd=work)
+half = subprocess.Popen(
+    [program, "run", stopped, "-o", "stopped", "--threads", "1"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=work
+)
 while half.poll() is None and not os.path.exists(os.path.join(work, "stopped", "maps", "h_max.tif")):
     pass
 open(os.path.join(work, "stopped", "STOP"), "w").close()
@@ -140,10 +144,14 @@ check(maps["columns"] == 20 and maps["rows"] == 15 and maps["cell"] == CELL, f"t
 check(maps["volume_beyond"] == 0 and abs(maps["volume"] / initial - 1) < 0.02, f"the heap keeps its volume: {maps['volume']} m3")
 points = {p["name"]: p for p in rows("one", "points.csv")}
 check(list(points) == ["under the heap", "shed, old", "far"], f"points by name: {list(points)}")
-check(float(points["under the heap"]["h_max"]) >= 0.79 and float(points["under the heap"]["t_arrival"]) == 0,
-      f"under the heap it is as thick as the heap from the start: {points['under the heap']}")
-check(0 < float(points["shed, old"]["t_arrival"]) < 0.4 and float(points["shed, old"]["v_max"]) > 0.1,
-      f"the shed is reached on the way: {points['shed, old']}")
+check(
+    float(points["under the heap"]["h_max"]) >= 0.79 and float(points["under the heap"]["t_arrival"]) == 0,
+    f"under the heap it is as thick as the heap from the start: {points['under the heap']}",
+)
+check(
+    0 < float(points["shed, old"]["t_arrival"]) < 0.4 and float(points["shed, old"]["v_max"]) > 0.1,
+    f"the shed is reached on the way: {points['shed, old']}",
+)
 check(all(points["far"][c] == "" for c in ("t_arrival", "h_max", "v_max", "p_max")), f"nothing comes far: {points['far']}")
 front = rows("one", "front.csv")
 far = [float(r["distance"]) for r in front if r["distance"]]
@@ -156,36 +164,55 @@ for limit, least in (("0.15", 0.5), ("0.4", 0.2)):
 
 with open(os.path.join(work, "one", "report.html")) as f:
     page = f.read()
-check('<section id="maps">' in page and page.split('<section id="maps">')[1].split("</section>")[0].count("data:image/png") == 2,
-      "the report shows thickness and arrival")
+check(
+    '<section id="maps">' in page and page.split('<section id="maps">')[1].split("</section>")[0].count("data:image/png") == 2,
+    "the report shows thickness and arrival",
+)
 with open(os.path.join(work, "one", "maps", "h_max.qml")) as f:
     style = xml.etree.ElementTree.fromstring(f.read()).find(".//colorrampshader")
-check(len(style) == 11 and float(style[-1].get("value")) == float(style.get("maximumValue")), "a style of eleven colours up to the greatest value")
+check(
+    len(style) == 11 and float(style[-1].get("value")) == float(style.get("maximumValue")),
+    "a style of eleven colours up to the greatest value",
+)
 
 # ---- as others read them
 if shutil.which("gdalinfo") and shutil.which("gdallocationinfo"):
+
     def value(name, x, y):
-        said = subprocess.run(["gdallocationinfo", "-valonly", "-geoloc", f"one/maps/{name}.tif", str(x), str(y)], capture_output=True, text=True,
-                              cwd=work)
+        said = subprocess.run(
+            ["gdallocationinfo", "-valonly", "-geoloc", f"one/maps/{name}.tif", str(x), str(y)], capture_output=True, text=True, cwd=work
+        )
         return float(said.stdout)
 
     for name in NAMES:
-        said = json.loads(subprocess.run(["gdalinfo", "-json", "-stats", f"one/maps/{name}.tif"], capture_output=True, text=True, cwd=work).stdout)
+        said = json.loads(
+            subprocess.run(["gdalinfo", "-json", "-stats", f"one/maps/{name}.tif"], capture_output=True, text=True, cwd=work).stdout
+        )
         band = said["bands"][0]
-        check(said["size"] == [20, 15] and said["geoTransform"] == [-1.0, 0.2, 0.0, 2.0, 0.0, -0.2] and band["type"] == "Float32"
-              and band["noDataValue"] == -9999, f"{name}: size, place, cell, nodata as GDAL reads them")
+        check(
+            said["size"] == [20, 15]
+            and said["geoTransform"] == [-1.0, 0.2, 0.0, 2.0, 0.0, -0.2]
+            and band["type"] == "Float32"
+            and band["noDataValue"] == -9999,
+            f"{name}: size, place, cell, nodata as GDAL reads them",
+        )
     for name in NAMES:
         os.path.exists(aux := os.path.join(work, "one", "maps", name + ".tif.aux.xml")) and os.remove(aux)
     for p in points.values():
         for column in ("t_arrival", "h_max", "v_max", "hv_max", "p_max", "h_end", "force_deposit"):
             here = value(column, p["x"], p["y"])
             there = float(p[column]) if p[column] else -9999
-            check(math.isclose(here, there, rel_tol=1e-6, abs_tol=1e-9), f"{column} at {p['name']}: {here} in the map, {there} in points.csv")
-    total = sum(v for k in range(15) for c in range(20) if (v := value("h_end", -0.9 + 0.2 * c, -0.9 + 0.2 * k)) > 0) * CELL ** 2
+            check(
+                math.isclose(here, there, rel_tol=1e-6, abs_tol=1e-9), f"{column} at {p['name']}: {here} in the map, {there} in points.csv"
+            )
+    total = sum(v for k in range(15) for c in range(20) if (v := value("h_end", -0.9 + 0.2 * c, -0.9 + 0.2 * k)) > 0) * CELL**2
     check(abs(total / maps["volume"] - 1) < 1e-6, f"the cells of h_end hold all soil: {total} of {maps['volume']} m3")
     h = value("h_end", 0.3, 0.3)
     sine = math.sin(math.radians(25))
-    check(abs(value("force_deposit", 0.3, 0.3) / ((1 - sine) / (1 + sine) * RHO * 9.81 * h / 1000) - 1) < 0.05, "active pressure of the deposit")
+    check(
+        abs(value("force_deposit", 0.3, 0.3) / ((1 - sine) / (1 + sine) * RHO * 9.81 * h / 1000) - 1) < 0.05,
+        "active pressure of the deposit",
+    )
     check(abs(value("trust", 0.3, 0.3) - h / DX) < 1e-4, "trust counts layers")
     check(abs(value("bed_change", 0.3, 0.3) - (h - 0.8)) < 1e-5 and value("bed_change", 0.7, 0.3) > 0, "the surface sank and rose")
 else:
@@ -195,10 +222,15 @@ else:
 wild = ("--force-step", "--set", "time.end=0.39", "--quiet", "--set")
 call("run", one, "-o", "broken", *wild, "time.step=0.03", expect=3)
 maps = summary("broken").get("maps", {})
-check(maps.get("time") == summary("broken")["time"] and "h_max.tif" in os.listdir(os.path.join(work, "broken", "maps")), f"a failure: {maps}")
+check(
+    maps.get("time") == summary("broken")["time"] and "h_max.tif" in os.listdir(os.path.join(work, "broken", "maps")), f"a failure: {maps}"
+)
 call("run", one, "-o", "mended", *wild, "time.step=0.03", "--set", "time.retry=true")
 call("run", one, "-o", "half", *wild, "time.step=0.015")
-check(summary("mended")["retries"] and summary("mended")["state_hash"] == summary("half")["state_hash"], "back to the start, on with half the step")
+check(
+    summary("mended")["retries"] and summary("mended")["state_hash"] == summary("half")["state_hash"],
+    "back to the start, on with half the step",
+)
 check(digest("mended") == digest("half"), "the failed attempt is on no map")
 
 # ---- on real ground: its coordinate system, map coordinates, points of a file that names its system
@@ -209,16 +241,34 @@ with open(os.path.join(work, "dem.asc"), "w") as f:
 
 
 def collection(kind, coordinates, properties):
-    return json.dumps({"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::6670"}}, "features": [
-        {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}]})
+    return json.dumps(
+        {
+            "type": "FeatureCollection",
+            "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::6670"}},
+            "features": [{"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}],
+        }
+    )
 
 
-for name, text in (("scar.geojson", collection("Polygon", [[[X0 + x, Y0 + y] for x, y in ((10, 14), (18, 14), (18, 24), (10, 24), (10, 14))]], {})),
-                   ("houses.geojson", collection("Point", [X0 + 19.5, Y0 + 19.5], {"name": "mill"})),
-                   ("slide.toml", SCENE.format(dimensions=3, end=1.5, maps='[maps]\nlimits = [0.5]\npoints = "houses.geojson"')
-                    .replace("spacing = 0.1", "spacing = 0.5").replace("step = 0.004\n", "").replace("3.0e5", "3.0e6")
-                    .replace("[[wall]]\nbox = { low = [-1.0, -1.0, -0.3], high = [3.0, 2.0, 0.0] }", '[terrain]\ndem = "dem.asc"\ncrs = "EPSG:6670"\nfriction = 20.0')
-                    .replace("box = { low = [0.0, 0.0, 0.0], high = [0.6, 0.6, 0.8] }", 'release = { outline = "scar.geojson", thickness = 2.0, on_top = true }'))):
+for name, text in (
+    ("scar.geojson", collection("Polygon", [[[X0 + x, Y0 + y] for x, y in ((10, 14), (18, 14), (18, 24), (10, 24), (10, 14))]], {})),
+    ("houses.geojson", collection("Point", [X0 + 19.5, Y0 + 19.5], {"name": "mill"})),
+    (
+        "slide.toml",
+        SCENE.format(dimensions=3, end=1.5, maps='[maps]\nlimits = [0.5]\npoints = "houses.geojson"')
+        .replace("spacing = 0.1", "spacing = 0.5")
+        .replace("step = 0.004\n", "")
+        .replace("3.0e5", "3.0e6")
+        .replace(
+            "[[wall]]\nbox = { low = [-1.0, -1.0, -0.3], high = [3.0, 2.0, 0.0] }",
+            '[terrain]\ndem = "dem.asc"\ncrs = "EPSG:6670"\nfriction = 20.0',
+        )
+        .replace(
+            "box = { low = [0.0, 0.0, 0.0], high = [0.6, 0.6, 0.8] }",
+            'release = { outline = "scar.geojson", thickness = 2.0, on_top = true }',
+        ),
+    ),
+):
     with open(os.path.join(work, name), "w") as f:
         f.write(text)
 call("run", "slide.toml", "-o", "slide", "--quiet")
@@ -239,7 +289,10 @@ if shutil.which("gdalinfo"):
         said = json.loads(subprocess.run(["gdalinfo", "-json", f"slide/maps/{name}.tif"], capture_output=True, text=True, cwd=work).stdout)
         check("6670" in said["coordinateSystem"]["wkt"][-20:], f"{name}: GDAL reads the ground's system")
         place = said["geoTransform"]
-        check([place[0], place[1], place[5]] == [maps["x"], 1.0, -1.0] and place[3] == maps["y"] + maps["rows"], f"{name}: and its place, {place}")
+        check(
+            [place[0], place[1], place[5]] == [maps["x"], 1.0, -1.0] and place[3] == maps["y"] + maps["rows"],
+            f"{name}: and its place, {place}",
+        )
 
 # ---- what is refused: exit 2, and nothing is written
 flat = scene("flat", maps="[maps]", dimensions=2)
@@ -251,7 +304,7 @@ with open(os.path.join(work, "elsewhere.csv"), "w") as f:
     f.write("name,x,y\na,100,200\nb,300,400\n")
 beyond = scene("beyond", maps='[maps]\npoints = "elsewhere.csv"')
 said = call("run", beyond, "-o", "beyond", expect=2).stderr
-check("elsewhere.csv: \"a\" at (100, 200) is not on the maps" in said and "none of the points is" in said, f"points of another place: {said}")
+check('elsewhere.csv: "a" at (100, 200) is not on the maps' in said and "none of the points is" in said, f"points of another place: {said}")
 check(not any(os.path.exists(os.path.join(work, d)) for d in ("flat", "nowhere", "beyond")), "nothing was written")
 plain = scene("plain", maps="", end=0.05)
 call("run", plain, "-o", "plain", "--quiet")
