@@ -1,5 +1,6 @@
 // Both stages of every compiled staggered model against solver/kernels/staggered_by_the_book.hpp: in 3-D and 2-D, plain, in lanes and in
 // mixed precision, far from walls and beside walls of every shape and surface, corners, seams and images across a period.
+// Beyond 400 lines: one comparison, whose clouds, book and judgement belong together.
 #include "solver/kernels/staggered_by_the_book.hpp"
 #include "tests/unit/clouds.hpp"
 #include "tests/unit/run_staggered.hpp"
