@@ -48,14 +48,6 @@ public:
 
 private:
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
-    double x_of(int i) const { return dem_.x + i * dem_.cell; }
-    double y_of(int j) const { return dem_.y + j * dem_.cell; }
-    template <class Visit> void for_each_cell(Visit visit) const
-    {
-        for (int j = 0; j < dem_.rows; ++j)
-            for (int i = 0; i < dem_.columns; ++i) visit(i, j, std::size_t(j) * std::size_t(dem_.columns) + std::size_t(i));
-    }
-
     void check_keys()
     {
         need_terrain("terrain");
@@ -210,12 +202,12 @@ private:
     double reach(const Window& box) const
     {
         double top = -std::numeric_limits<double>::infinity(), low = -top;
-        for_each_cell([&](int i, int j, std::size_t k) {
+        dem_.for_each([&](int i, int j, std::size_t k) {
             const double z = dem_.values[k];
             if (std::isnan(z)) return;
             low = std::min(low, z);
-            if (x_of(i) >= box.low_x - dem_.cell && x_of(i) <= box.high_x + dem_.cell && y_of(j) >= box.low_y - dem_.cell &&
-                y_of(j) <= box.high_y + dem_.cell)
+            if (dem_.x_of(i) >= box.low_x - dem_.cell && dem_.x_of(i) <= box.high_x + dem_.cell && dem_.y_of(j) >= box.low_y - dem_.cell &&
+                dem_.y_of(j) <= box.high_y + dem_.cell)
                 top = std::max(top, z);
         });
         return top > low ? (top - low) / reach_slope : 0;
@@ -225,7 +217,7 @@ private:
     {
         double low = std::numeric_limits<double>::infinity(), high = -low;
         bool whole = true;
-        for_each_cell([&](int i, int j, std::size_t k) {
+        dem_.for_each([&](int i, int j, std::size_t k) {
             const double z = dem_.values[k];
             if (std::isnan(z)) return;
             if (z < -11000 || z > 9000)

@@ -1,5 +1,6 @@
 // The mass that fails, on the cells of the ground: its thickness, its bed, and what is doubtful about it.
 #include "io/ground/loading.hpp"
+#include "solver/scene/ring.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -48,7 +49,7 @@ public:
             std::fill(t.begin(), t.end(), *r.thickness);
         } else if (!r.thickness_map.empty()) {
             t = read(".thickness_map", r.thickness_map);
-            for_each_cell([&](int i, int j, std::size_t k) {
+            dem_.for_each([&](int i, int j, std::size_t k) {
                 if (t[k] < 0)
                     throw Refused{m.key + ".thickness_map", fmt::format("{}: expected thicknesses from 0, found {} m at {}. Remedy: "
                                                                         "gdal_calc.py, or declare it no data: gdal_translate -a_nodata {}",
@@ -56,7 +57,7 @@ public:
             });
         } else if (!r.surface.empty()) {
             const auto slip = read(".surface", r.surface);
-            for_each_cell([&](int i, int j, std::size_t k) {
+            dem_.for_each([&](int i, int j, std::size_t k) {
                 if (m.rings.empty() ? std::isnan(slip[k]) : !in(m, i, j)) {
                     if (!std::isnan(slip[k]) && !std::isnan(z[k])) t[k] = std::max(0.0, z[k] - slip[k]);
                     return;
@@ -75,7 +76,7 @@ public:
             const auto before = read(".before", r.before), after = read(".after", r.after);
             double square = 0;
             std::size_t outside = 0;
-            for_each_cell([&](int i, int j, std::size_t k) {
+            dem_.for_each([&](int i, int j, std::size_t k) {
                 const bool here = !m.rings.empty() && in(m, i, j);
                 if (here && std::isnan(before[k])) refuse_gap(".before", r.before, i, j);
                 if (here && std::isnan(after[k])) refuse_gap(".after", r.after, i, j);
@@ -90,16 +91,16 @@ public:
                                         "or has trees, or the deposit is in the window",
                                         std::sqrt(square / double(outside))));
         } else {
-            for_each_cell([&](int i, int j, std::size_t k) {
+            dem_.for_each([&](int i, int j, std::size_t k) {
                 for (const auto& o : m.outlines)
-                    if (std::isnan(t[k]) && inside(o.rings, x_of(i), y_of(j))) t[k] = *o.thickness;
+                    if (std::isnan(t[k]) && scene::encloses(o.rings, dem_.x_of(i), dem_.y_of(j))) t[k] = *o.thickness;
             });
         }
 
         // Inside, ground must be known; the bed follows.
         double sum = 0, thickest = 0;
         std::size_t cells = 0;
-        for_each_cell([&](int i, int j, std::size_t k) {
+        dem_.for_each([&](int i, int j, std::size_t k) {
             const bool here = m.rings.empty() ? t[k] > 0 : in(m, i, j);
             if (!here) return;
             if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
@@ -133,7 +134,7 @@ public:
                     if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
             } else {
                 // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
-                for_each_cell([&](int i, int j, std::size_t k) {
+                dem_.for_each([&](int i, int j, std::size_t k) {
                     if (t[k] == 0 && !in(m, i, j)) t[k] = none;
                 });
                 extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
@@ -145,22 +146,15 @@ public:
 
 private:
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
-    double x_of(int i) const { return dem_.x + i * dem_.cell; }
-    double y_of(int j) const { return dem_.y + j * dem_.cell; }
-    template <class Visit> void for_each_cell(Visit visit) const
-    {
-        for (int j = 0; j < dem_.rows; ++j)
-            for (int i = 0; i < dem_.columns; ++i) visit(i, j, std::size_t(j) * std::size_t(dem_.columns) + std::size_t(i));
-    }
 
-    bool in(const Mass& m, int i, int j) const { return m.rings.empty() || inside(m.rings, x_of(i), y_of(j)); }
+    bool in(const Mass& m, int i, int j) const { return m.rings.empty() || scene::encloses(m.rings, dem_.x_of(i), dem_.y_of(j)); }
 
     /// Gives cells without a value that touch cells with one the mean of these, some times over: an outline cuts between cells.
     void extend(std::vector<double>& values, int times) const
     {
         for (int t = 0; t < times; ++t) {
             auto next = values;
-            for_each_cell([&](int i, int j, std::size_t k) {
+            dem_.for_each([&](int i, int j, std::size_t k) {
                 if (!std::isnan(values[k])) return;
                 double sum = 0;
                 int n = 0;
@@ -180,7 +174,7 @@ private:
     {
         double top = -std::numeric_limits<double>::infinity();
         const auto& z = dem_.values;
-        for_each_cell([&](int, int, std::size_t k) {
+        dem_.for_each([&](int, int, std::size_t k) {
             if (!std::isnan(m.bed[k])) top = std::max(top, z[k]);
         });
         double low = top;
@@ -194,8 +188,8 @@ private:
         const auto distance = [&](double x, double y) {
             return std::hypot(std::max({b.low_x - x, x - b.high_x, 0.0}), std::max({b.low_y - y, y - b.high_y, 0.0}));
         };
-        for_each_cell([&](int i, int j, std::size_t k) {
-            const double d = distance(x_of(i), y_of(j));
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            const double d = distance(dem_.x_of(i), dem_.y_of(j));
             if (d > way) return;
             if (std::isnan(z[k])) {
                 ++missing;
@@ -206,28 +200,26 @@ private:
             if (i == 0 || j == 0 || i + 1 == dem_.columns || j + 1 == dem_.rows) return;
             const double sx = (dem_.at(i + 1, j) - dem_.at(i - 1, j)) / (2 * dem_.cell),
                          sy = (dem_.at(i, j + 1) - dem_.at(i, j - 1)) / (2 * dem_.cell);
-            const double slope = std::atan(std::hypot(sx, sy)) * 180 / 3.14159265358979323846;
+            const double slope = std::atan(std::hypot(sx, sy)) * 180 / std::numbers::pi;
             if (slope > most_doubtful_slope) ++steep;
             if (slope > steepest) steepest = slope, steepest_i = i, steepest_j = j;
         });
         // Beyond the edge: cells of the circle that are not there. Only where the ground at the edge can be reached.
-        std::size_t beyond = 0;
         const auto edge_reached = [&](int i, int j) {
-            return !std::isnan(dem_.at(i, j)) && dem_.at(i, j) <= top - reach_slope * distance(x_of(i), y_of(j));
+            return !std::isnan(dem_.at(i, j)) && dem_.at(i, j) <= top - reach_slope * distance(dem_.x_of(i), dem_.y_of(j));
         };
         std::size_t edge = 0, edges = 0;
         for (int i = 0; i < dem_.columns; ++i) edges += 2, edge += edge_reached(i, 0), edge += edge_reached(i, dem_.rows - 1);
         for (int j = 0; j < dem_.rows; ++j) edges += 2, edge += edge_reached(0, j), edge += edge_reached(dem_.columns - 1, j);
-        beyond = edge;
         if (missing > 0)
             warn("terrain.dem", fmt::format("{:.2g} % of the cells within reach of {} (the line of 11 degrees from its top) have no data: "
                                             "soil that comes there is lost",
                                             100 * double(missing) / double(missing + known), m.key));
-        if (beyond > 0)
+        if (edge > 0)
             warn(terrain_.window ? "terrain.window" : "terrain.dem",
                  fmt::format("the edge of the ground lies within reach of {} (the line of 11 degrees from its top): {:.2g} % of its edge "
                              "can be passed. Remedy: a larger {}",
-                             m.key, 100 * double(beyond) / double(edges), terrain_.window ? "window" : "elevation model"));
+                             m.key, 100 * double(edge) / double(edges), terrain_.window ? "window" : "elevation model"));
         if (steep > 0)
             warn("terrain.dem",
                  fmt::format(

@@ -1,6 +1,7 @@
 #include "io/ground/vectors.hpp"
 #include "io/ground/crs.hpp"
 #include "io/ground/features.hpp"
+#include "solver/scene/ring.hpp"
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -8,37 +9,14 @@
 
 namespace kuzure::io {
 
-bool inside(const std::vector<scene::Ring>& rings, double x, double y)
-{
-    bool in = false;
-    for (const auto& ring : rings)
-        for (std::size_t k = 0, last = ring.size() - 1; k < ring.size(); last = k++) {
-            const auto &a = ring[last], &b = ring[k];
-            // Half open in y, so that a corner counts once.
-            if ((a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) in = !in;
-        }
-    return in;
-}
-
-namespace {
-double signed_area(const scene::Ring& ring)
-{
-    double twice = 0;
-    const auto o = ring[0]; // near the ring: map coordinates are large
-    for (std::size_t k = 0, last = ring.size() - 1; k < ring.size(); last = k++)
-        twice += (ring[last][0] - o[0]) * (ring[k][1] - o[1]) - (ring[k][0] - o[0]) * (ring[last][1] - o[1]);
-    return 0.5 * twice;
-}
-} // namespace
-
 double area(const std::vector<scene::Ring>& rings)
 {
     double sum = 0;
     for (std::size_t k = 0; k < rings.size(); ++k) {
         int depth = 0;
         for (std::size_t i = 0; i < rings.size(); ++i)
-            if (i != k && inside({rings[i]}, rings[k][0][0], rings[k][0][1])) ++depth;
-        sum += (depth % 2 ? -1 : 1) * std::abs(signed_area(rings[k]));
+            if (i != k && scene::encloses(rings[i], rings[k][0][0], rings[k][0][1])) ++depth;
+        sum += (depth % 2 ? -1 : 1) * std::abs(scene::signed_area(rings[k]));
     }
     return sum;
 }
@@ -141,13 +119,14 @@ void check_outlines(const Outlines& o, const Path& path)
             }
     for (std::size_t k = 0; k < o.features.size(); ++k)
         for (const auto& ring : o.features[k].rings)
-            if (signed_area(ring) == 0) refuse(path, k, fmt::format("a ring that encloses nothing. {}", mend));
+            if (scene::signed_area(ring) == 0) refuse(path, k, fmt::format("a ring that encloses nothing. {}", mend));
     for (std::size_t i = 0; i < o.features.size(); ++i)
         for (std::size_t k = 0; k < o.features.size(); ++k)
             if (i != k)
                 for (const auto& ring : o.features[i].rings)
-                    if (inside(o.features[k].rings, ring[0][0], ring[0][1]) && inside(o.features[k].rings, ring[1][0], ring[1][1]) &&
-                        inside(o.features[k].rings, ring[2][0], ring[2][1]))
+                    if (scene::encloses(o.features[k].rings, ring[0][0], ring[0][1]) &&
+                        scene::encloses(o.features[k].rings, ring[1][0], ring[1][1]) &&
+                        scene::encloses(o.features[k].rings, ring[2][0], ring[2][1]))
                         refuse(path, i,
                                fmt::format("it lies inside feature {}. Remedy: a hole is a ring of its polygon (QGIS: Add ring), "
                                            "not a feature of its own; else delete one",

@@ -47,8 +47,6 @@ struct MapLayer {
 /// name.shp with .shx, .dbf, .cpg and .prj beside it; the same bytes for the same layer. Throws IoFailed.
 void write_shapefile(const Place& shp, const MapLayer&);
 
-/// Whether a place lies inside: within an odd number of rings.
-bool inside(const std::vector<scene::Ring>&, double x, double y);
 /// Area of what an odd number of rings encloses, m^2, where no two cross.
 double area(const std::vector<scene::Ring>&);
 

@@ -84,7 +84,7 @@ Columns::Above Columns::above(Vector x, int body) const
     for_each_image(x, reach, [&](Vector shift) {
         const Vector at = x + shift;
         const Box region{{at.x - reach, at.y - reach, x.z - (0.5 - nothing_) * dx}, {at.x + reach, at.y + reach, top + dx}};
-        filling_.for_each_soil_stack_in(region, [&](const Lattice::Stack& s, int b) {
+        filling_.for_each_soil_stack_in(region, [&](const Stack& s, int b) {
             const double part = share(s.x - at.x) * (scene_.dimensions == 2 ? 1 : share(s.y - at.y));
             if (b == body && part == 1 && s.foot < x.z && s.top > x.z) own.top = s.top;
             else if (part > nothing_) others.push_back({b, s.foot, s.top, part});
@@ -120,7 +120,7 @@ struct Bystander {
     const Columns& columns;
     double nothing; // as Columns has it
     int body;
-    Lattice::Stack stack;
+    Stack stack;
 
     double dx() const { return scene.space.spacing; }
     double lowest() const { return stack.foot + 0.5 * dx(); }
@@ -137,7 +137,7 @@ struct Bystander {
         const double surface = columns.above({stack.x, stack.y, lowest()}, body).surface;
         std::string why;
         const auto compare = [&](Vector shift) {
-            filling.for_each_soil_stack_in({from + shift, to + shift}, [&](const Lattice::Stack& n, int other) {
+            filling.for_each_soil_stack_in({from + shift, to + shift}, [&](const Stack& n, int other) {
                 const double there = columns.above({n.x, n.y, n.foot + 0.5 * dx()}, other).surface;
                 if (why.empty() && std::abs(there - surface) > 0.75 * dx())
                     why =
@@ -192,7 +192,7 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
     std::string why;
     for (int b = 0; b < int(scene.bodies.size()); ++b) {
         if (!rests(scene.bodies[std::size_t(b)])) continue;
-        filling.for_each_stack_of(b, {{-far, -far, -far}, {far, far, far}}, [&](const Lattice::Stack& stack) {
+        filling.for_each_stack_of(b, {{-far, -far, -far}, {far, far, far}}, [&](const Stack& stack) {
             const Bystander s{scene, filling, columns, least_share(scene, filling), b, stack};
             for (const bool along_x : {true, false})
                 if (why.empty() && (along_x || !flat)) why = s.step_up_or_down(along_x);

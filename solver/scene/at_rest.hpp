@@ -10,7 +10,7 @@ inline bool rests(const Body& b) { return b.stress == InitialStress::AtRest; }
 
 /// Soil above points of soil, in columns one spacing wide.
 ///
-/// A column carries the stacks of particles (Lattice::Stack) that rest on it, each by the share of the column's width that it covers:
+/// A column carries the stacks of particles (Stack) that rest on it, each by the share of the column's width that it covers:
 /// 1 on the same lattice, less on a shifted one. What rests on those counts likewise, and so on up to the first gap, be it air or a
 /// wall. What stands beside the column counts nothing, though cells of shifted lattices overlap a little there.
 class Columns {

@@ -1,4 +1,5 @@
 #include "solver/scene/contour.hpp"
+#include "solver/scene/ring.hpp"
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -118,39 +119,21 @@ private:
     std::vector<std::int64_t> order_;
 };
 
-bool holds(const Ring& ring, std::array<double, 2> p)
-{
-    bool inside = false;
-    for (std::size_t k = 0, last = ring.size() - 1; k < ring.size(); last = k++) {
-        const auto &a = ring[k], &b = ring[last];
-        if ((a[1] > p[1]) != (b[1] > p[1]) && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0]) inside = !inside;
-    }
-    return inside;
-}
-
 } // namespace
-
-double doubled_area(const Ring& ring)
-{
-    double sum = 0;
-    for (std::size_t k = 0, last = ring.size() - 1; k < ring.size(); last = k++)
-        sum += (ring[last][0] - ring[0][0]) * (ring[k][1] - ring[0][1]) - (ring[k][0] - ring[0][0]) * (ring[last][1] - ring[0][1]);
-    return sum;
-}
 
 std::vector<Area> areas_above(const Grid& grid, double level)
 {
     std::vector<Area> areas;
     std::vector<Ring> holes;
     for (auto& ring : Tracer(grid, level).rings()) {
-        if (doubled_area(ring) > 0) areas.push_back({std::move(ring)});
+        if (signed_area(ring) > 0) areas.push_back({std::move(ring)});
         else holes.push_back(std::move(ring));
     }
     for (auto& hole : holes) {
         // Of the areas around it the smallest.
         Area* around = nullptr;
         for (auto& area : areas)
-            if (holds(area[0], hole[0]) && (!around || doubled_area(area[0]) < doubled_area((*around)[0]))) around = &area;
+            if (encloses(area[0], hole[0][0], hole[0][1]) && (!around || signed_area(area[0]) < signed_area((*around)[0]))) around = &area;
         if (around) around->push_back(std::move(hole));
     }
     return areas;

@@ -12,7 +12,4 @@ using Area = std::vector<Ring>;
 /// touch one another.
 std::vector<Area> areas_above(const Grid&, double level);
 
-/// Twice the signed area (m^2) of a ring, positive counterclockwise.
-double doubled_area(const Ring&);
-
 } // namespace kuzure::scene

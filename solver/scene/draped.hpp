@@ -11,6 +11,12 @@
 
 namespace kuzure::scene {
 
+/// Points one above the other without a gap, as a column one spacing wide.
+struct Stack {
+    double x, y;      // m, its axis
+    double foot, top; // m, half a spacing beyond its lowest and highest point
+};
+
 /// Points (i + 1/2, j + 1/2) spacings in plan, at heights z_s + (k + 1/2) spacings: k = 0, 1, .. of a release, k = -1, -2, .. of the
 /// ground. Local ids: y slowest, then x, then z from below.
 class Draped {
@@ -37,7 +43,7 @@ public:
                 if (const double z = height(surface, k, n); z >= region.low.z && z <= region.high.z) visit(first + k, Vector{x, y, z});
         });
     }
-    /// Calls visit(x, y, foot, top) for the columns with points in a closed region; foot and top are half a spacing beyond the points.
+    /// Calls visit(Stack) for the columns with points in a closed region.
     template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const
     {
         for_each_column_in(region, [&](std::int64_t, double x, double y, double surface, std::int64_t n) {
@@ -48,7 +54,7 @@ public:
                     if (in++ == 0) foot = z - 0.5 * spacing_;
                     top = z + 0.5 * spacing_;
                 }
-            if (in > 0) visit(x, y, foot, top);
+            if (in > 0) visit(Stack{x, y, foot, top});
         });
     }
     bool has_column(std::int64_t i, std::int64_t j) const

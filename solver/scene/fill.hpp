@@ -52,11 +52,6 @@ public:
     std::int64_t count_in(const Box& region) const;
     /// Calls visit(local id, position) for every point in a closed region, by rising id; in 2-D its y does not count.
     template <class Visit> void for_each_in(const Box& region, Visit visit) const;
-    /// Points one above the other without a gap, as a column one spacing wide.
-    struct Stack {
-        double x, y;      // m, its axis
-        double foot, top; // m, half a spacing beyond its lowest and highest point
-    };
     /// Calls visit(Stack) for the stacks of the points in a closed region; in 2-D its y does not count.
     template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const;
     /// The points in a closed region where the shape is a box, else nothing.
@@ -152,11 +147,7 @@ public:
     }
     template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const
     {
-        if (lattice()) lattice()->for_each_stack_in(region, visit);
-        else
-            draped()->for_each_stack_in(region, [&](double x, double y, double foot, double top) {
-                visit(Lattice::Stack{x, y, foot, top});
-            });
+        std::visit([&](const auto& p) { p.for_each_stack_in(region, visit); }, of_);
     }
 
 private:
@@ -190,16 +181,15 @@ public:
         for (std::size_t b = 0; b < n_bodies_; ++b)
             points_[b].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[b] + k, x, int(b)); });
     }
-    /// Calls visit(Lattice::Stack) for the stacks of one body's particles in a closed region.
+    /// Calls visit(Stack) for the stacks of one body's particles in a closed region.
     template <class Visit> void for_each_stack_of(int body, const Box& region, Visit visit) const
     {
         points_[std::size_t(body)].for_each_stack_in(region, visit);
     }
-    /// Calls visit(Lattice::Stack, int body) for the stacks of soil particles in a closed region.
+    /// Calls visit(Stack, int body) for the stacks of soil particles in a closed region.
     template <class Visit> void for_each_soil_stack_in(const Box& region, Visit visit) const
     {
-        for (std::size_t b = 0; b < n_bodies_; ++b)
-            points_[b].for_each_stack_in(region, [&](const Lattice::Stack& s) { visit(s, int(b)); });
+        for (std::size_t b = 0; b < n_bodies_; ++b) points_[b].for_each_stack_in(region, [&](const Stack& s) { visit(s, int(b)); });
     }
     /// Calls visit(std::int64_t id, Vector x, int wall) for the wall particles in a closed region, by rising id.
     template <class Visit> void for_each_wall_in(const Box& region, Visit visit) const

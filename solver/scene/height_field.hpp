@@ -15,6 +15,14 @@ struct Grid {
     std::vector<double> values; // row by row from the south
     double& at(int column, int row) { return values[std::size_t(row) * std::size_t(columns) + std::size_t(column)]; }
     double at(int column, int row) const { return values[std::size_t(row) * std::size_t(columns) + std::size_t(column)]; }
+    double x_of(int column) const { return x + column * cell; } // m
+    double y_of(int row) const { return y + row * cell; }
+    /// Calls visit(column, row, place in `values`) for every point.
+    template <class Visit> void for_each(Visit visit) const
+    {
+        for (int j = 0; j < rows; ++j)
+            for (int i = 0; i < columns; ++i) visit(i, j, std::size_t(j) * std::size_t(columns) + std::size_t(i));
+    }
     bool operator==(const Grid&) const = default;
 };
 

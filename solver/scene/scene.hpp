@@ -66,7 +66,7 @@ enum class Edge { Open, Closed }; // what soil does that leaves the ground: it i
 struct Terrain {
     std::vector<std::string> dem;                // absolute paths; a later one fills what earlier ones leave open
     std::string crs;                             // "EPSG:6670"; empty: that of the files
-    std::optional<std::array<double, 4>> window; // m, x and y from, x and y to, in the CRS; absent: all of the files
+    std::optional<std::array<double, 4>> window; // m, x and y from, x and y to, in the CRS; absent: what releases reach
     Surface surface = Surface::Coulomb;
     double friction_angle = 0; // rad, for Coulomb
     Edge edge = Edge::Open;

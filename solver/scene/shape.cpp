@@ -1,5 +1,6 @@
 #include "solver/scene/shape.hpp"
 #include "solver/scene/height_field.hpp"
+#include "solver/scene/ring.hpp"
 #include <initializer_list>
 #include <numbers>
 
@@ -28,29 +29,6 @@ Point corner(const Polygon& p, std::size_t k)
     const std::size_t n = p.points.size();
     const auto& q = p.points[k < n ? k : k - n];
     return {q[0], q[1]};
-}
-
-/// Even-odd rule in x-z.
-bool encloses(const Polygon& polygon, Point x)
-{
-    bool inside = false;
-    for (std::size_t k = 0; k < polygon.points.size(); ++k) {
-        const Point a = corner(polygon, k), b = corner(polygon, k + 1);
-        if ((a.z > x.z) != (b.z > x.z) && x.x < a.x + (x.z - a.z) / (b.z - a.z) * (b.x - a.x)) inside = !inside;
-    }
-    return inside;
-}
-
-/// Even-odd rule in plan: inside is what an odd number of rings encloses.
-bool encloses(const std::vector<Ring>& rings, double x, double y)
-{
-    bool inside = false;
-    for (const Ring& ring : rings)
-        for (std::size_t k = 0; k < ring.size(); ++k) {
-            const auto &a = ring[k], &b = ring[k + 1 < ring.size() ? k + 1 : 0];
-            if ((a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) inside = !inside;
-        }
-    return inside;
 }
 
 /// Distance (m) in plan to the outline of a release.
@@ -128,7 +106,7 @@ Contact contact_in_plane(const Polygon& polygon, Point x)
     const std::size_t k = where <= 0 ? edge : edge + 1 < n ? edge + 1 : 0;
     const Point d = x - corner(polygon, k);
     const double l = std::hypot(d.x, d.z);
-    const double sign = encloses(polygon, x) ? -1 : 1;
+    const double sign = encloses(polygon.points, x.x, x.z) ? -1 : 1;
     const Point e = corner(polygon, k + 1) - corner(polygon, k);
     if (l > 1e-12 * std::hypot(e.x, e.z)) return {sign * l, {sign * d.x / l, 0, sign * d.z / l}};
     const Point before = outward(k > 0 ? k - 1 : n - 1), after = outward(k), sum{before.x + after.x, before.z + after.z};
@@ -339,13 +317,7 @@ const char* name_of(const Shape& shape)
     return names[shape.index()];
 }
 
-double area(const Polygon& polygon)
-{
-    double sum = 0;
-    const Point origin = corner(polygon, 0);
-    for (std::size_t k = 1; k + 1 < polygon.points.size(); ++k) sum += cross(corner(polygon, k) - origin, corner(polygon, k + 1) - origin);
-    return 0.5 * sum;
-}
+double area(const Polygon& polygon) { return signed_area(polygon.points); }
 
 bool crosses_itself(const Polygon& polygon)
 {

@@ -1,5 +1,6 @@
 // Outlines: closed, with their holes, where the numbers reach the level.
 #include "solver/scene/contour.hpp"
+#include "solver/scene/ring.hpp"
 #include <cmath>
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ template <class F> Grid grid_of(int columns, int rows, F f)
 double area_of(const Area& a)
 {
     double sum = 0;
-    for (const auto& ring : a) sum += 0.5 * doubled_area(ring);
+    for (const auto& ring : a) sum += signed_area(ring);
     return sum;
 }
 
@@ -46,8 +47,8 @@ TEST(Contour, RingHasItsHoleAndWhatStandsInTheHoleIsAnArea)
     const auto& island = areas[areas[0].size() == 2 ? 1 : 0];
     ASSERT_EQ(ring.size(), 2u);
     ASSERT_EQ(island.size(), 1u);
-    EXPECT_GT(doubled_area(ring[0]), 0);
-    EXPECT_LT(doubled_area(ring[1]), 0);
+    EXPECT_GT(signed_area(ring[0]), 0);
+    EXPECT_LT(signed_area(ring[1]), 0);
     EXPECT_NEAR(area_of(ring), std::acos(-1.0) * (13 * 13 - 11 * 11), 1);
     EXPECT_NEAR(area_of(island), std::acos(-1.0) * 4, 0.3);
 }

@@ -1,29 +1,15 @@
 // Rasters written and read again: by us, and by GDAL's tools where they are installed.
-#include "io/ground/crs.hpp"
 #include "io/ground/raster.hpp"
-#include "solver/core/ensure.hpp"
+#include "tests/unit/map_files.hpp"
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fmt/format.h>
-#include <fstream>
-#include <gmock/gmock.h>
-#include <unistd.h>
 
 namespace kuzure::io {
 namespace {
 
 using ::testing::HasSubstr;
 
-class Rasters : public ::testing::Test {
+class Rasters : public MapFiles {
 protected:
-    void SetUp() override
-    {
-        if (!has_terrain()) GTEST_SKIP() << "built without maps";
-        std::filesystem::create_directories(folder);
-    }
-    void TearDown() override { std::filesystem::remove_all(folder); }
-    Path file(const std::string& name) const { return folder / name; }
     static scene::Grid hills(int columns, int rows, double x, double y, double cell)
     {
         scene::Grid g{x, y, cell, columns, rows, {}};
@@ -39,7 +25,6 @@ protected:
             if (a.values[k] != b.values[k] && !(std::isnan(a.values[k]) && std::isnan(b.values[k]))) return false;
         return a.values.size() == b.values.size();
     }
-    void write(const std::string& name, const std::string& text) const { std::ofstream(file(name), std::ios::binary) << text; }
     std::string ascii(const scene::Grid& g, bool centre = false, const std::string& nodata = "-9999") const
     {
         const double half = centre ? 0 : 0.5 * g.cell;
@@ -51,14 +36,6 @@ protected:
         }
         return text;
     }
-    std::string said_by(const std::string& command) const
-    {
-        const std::string to = file("said.txt").string();
-        const int code = std::system((command + " > " + to + " 2>&1").c_str());
-        std::ifstream in(to);
-        std::string text{std::istreambuf_iterator<char>(in), {}};
-        return code == 0 ? text : "failed: " + text;
-    }
     std::string refusal(const std::string& name) const
     {
         try {
@@ -68,7 +45,6 @@ protected:
         }
         return "taken";
     }
-    Path folder = std::filesystem::temp_directory_path() / fmt::format("kuzure-raster-{}", ::getpid());
 };
 
 TEST_F(Rasters, WhatWasWrittenIsRead)
@@ -122,7 +98,7 @@ TEST_F(Rasters, AWindowIsAPartOfTheWhole)
 
 TEST_F(Rasters, GdalReadsWhatWeWrite)
 {
-    if (std::system("gdalinfo --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no gdal-bin here";
+    if (!gdal()) GTEST_SKIP() << "no gdal-bin here";
     Raster r{hills(300, 200, -1500.5, 12000.5, 1), crs_from("EPSG:6670", "test")};
     r.grid.at(299, 0) = NAN;
     write_geotiff(file("a.tif"), r);
@@ -147,7 +123,7 @@ TEST_F(Rasters, GdalReadsWhatWeWrite)
 
 TEST_F(Rasters, EveryKindThatGdalWrites)
 {
-    if (std::system("gdalinfo --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no gdal-bin here";
+    if (!gdal()) GTEST_SKIP() << "no gdal-bin here";
     Raster r{hills(300, 200, -1500.5, 12000.5, 1), crs_from("EPSG:6670", "test")};
     for (double& x : r.grid.values) x = std::round(x);
     r.grid.at(299, 0) = r.grid.at(0, 199) = NAN;

@@ -1,41 +1,16 @@
 // Outlines and points: what we write is read by us and by GDAL's tools; what is read keeps holes, names and thicknesses.
-#include "io/ground/crs.hpp"
 #include "io/ground/vectors.hpp"
-#include "solver/core/ensure.hpp"
+#include "solver/scene/ring.hpp"
+#include "tests/unit/map_files.hpp"
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fmt/format.h>
-#include <fstream>
-#include <gmock/gmock.h>
-#include <unistd.h>
 
 namespace kuzure::io {
 namespace {
 
 using ::testing::HasSubstr;
 
-class Vectors : public ::testing::Test {
+class Vectors : public MapFiles {
 protected:
-    void SetUp() override
-    {
-        if (!has_terrain()) GTEST_SKIP() << "built without maps";
-        std::filesystem::create_directories(folder);
-    }
-    void TearDown() override { std::filesystem::remove_all(folder); }
-    Path file(const std::string& name) const { return folder / name; }
-    void write(const std::string& name, const std::string& text) const { std::ofstream(file(name), std::ios::binary) << text; }
-    static std::string bytes(const Path& path)
-    {
-        std::ifstream in(path, std::ios::binary);
-        return {std::istreambuf_iterator<char>(in), {}};
-    }
-    std::string said_by(const std::string& command) const
-    {
-        const int code = std::system((command + " > " + file("said.txt").string() + " 2>&1").c_str());
-        return (code == 0 ? "" : "failed: ") + bytes(file("said.txt"));
-    }
-    static bool gdal() { return std::system("ogrinfo --version > /dev/null 2>&1") == 0; }
     const scene::Ring outer{{100, 200}, {140, 200}, {140, 240}, {100, 240}}, hole{{110, 210}, {120, 210}, {120, 220}, {110, 220}},
         island{{200, 200}, {210, 200}, {205, 210}};
     MapLayer layer() const
@@ -45,15 +20,14 @@ protected:
                 {{{outer, hole}, {4.5, std::string("崩壊 1")}}, {{island}, {2.0, std::string("2")}}},
                 crs_from("EPSG:6670", "test")};
     }
-    Path folder = std::filesystem::temp_directory_path() / fmt::format("kuzure-vectors-{}", ::getpid());
 };
 
 TEST(Rings, InsideIsWhatAnOddNumberEncloses)
 {
     const std::vector<scene::Ring> rings{{{0, 0}, {10, 0}, {10, 10}, {0, 10}}, {{2, 2}, {4, 2}, {4, 4}, {2, 4}}};
-    EXPECT_TRUE(inside(rings, 1, 1));
-    EXPECT_FALSE(inside(rings, 3, 3));
-    EXPECT_FALSE(inside(rings, 11, 3));
+    EXPECT_TRUE(scene::encloses(rings, 1, 1));
+    EXPECT_FALSE(scene::encloses(rings, 3, 3));
+    EXPECT_FALSE(scene::encloses(rings, 11, 3));
     EXPECT_EQ(area(rings), 96);
     // At a distance of a million metres, as on a map.
     auto far = rings;
@@ -72,7 +46,7 @@ TEST_F(Vectors, AShapefileIsReadAsItWasWritten)
     EXPECT_EQ(area(read.features[0].rings), 1500);
     EXPECT_EQ(read.features[0].thickness, 4.5);
     EXPECT_EQ(area(read.features[1].rings), 50);
-    EXPECT_FALSE(inside(read.features[0].rings, 115, 215));
+    EXPECT_FALSE(scene::encloses(read.features[0].rings, 115, 215));
     // The same bytes again, and no date in them.
     write_shapefile(file("b.shp"), layer());
     for (const char* ending : {".shp", ".shx", ".dbf", ".prj", ".cpg"})

@@ -3,6 +3,7 @@
 #include "io/ground/raster.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/height_field.hpp"
+#include "solver/scene/ring.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -319,9 +320,9 @@ void Maps::write_outlines(const io::Place& folder, const std::vector<io::MapPict
     for (const auto& [limit, areas] : outlines) {
         io::MapLayer layer{.kind = io::MapLayer::Polygons, .columns = {"limit_m", "area_m2"}, .features = {}, .crs = scene_.map_frame.crs};
         for (const auto& area : areas) {
-            double twice = 0;
-            for (const auto& ring : area) twice += scene::doubled_area(ring);
-            layer.features.push_back({area, {limit, 0.5 * twice}});
+            double sum = 0;
+            for (const auto& ring : area) sum += scene::signed_area(ring);
+            layer.features.push_back({area, {limit, sum}});
         }
         const std::string name = fmt::format("outline_{}", limit);
         io::write_shapefile(folder / (name + ".shp"), layer);
