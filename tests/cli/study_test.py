@@ -159,6 +159,16 @@ class Study(unittest.TestCase):
         self.assertEqual(running.returncode, 5, output)
         self.assertIn("goes on from here", output)
 
+    def test_a_stop_between_two_points_is_heard_too(self):
+        running = subprocess.Popen([program, "study", self.dir / "sweep.toml", "-o", self.dir / "out"], stdout=subprocess.PIPE, text=True)
+        limit = time.monotonic() + 60
+        while not list(self.dir.glob("out/points/*/point.json")) and time.monotonic() < limit:
+            time.sleep(0.001)
+        running.terminate()
+        output, _ = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 5, output)
+        self.assertIn("goes on from here", output)
+
     def test_twins_give_error_bars_and_change_no_bit(self):
         plain = kuzure("run", self.dir / "block.toml", "-o", self.dir / "plain", "--quiet", "--threads", 1, "--set", "space.spacing=0.05")
         self.assertEqual(plain.returncode, 0, plain.stderr)

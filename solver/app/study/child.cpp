@@ -1,6 +1,5 @@
 #include "solver/app/study/child.hpp"
 #include <cerrno>
-#include <csignal>
 #include <cstdlib>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -22,6 +21,16 @@ void pass_on(int signal)
 }
 } // namespace
 
+StopRequest::StopRequest()
+{
+    stop_signal = 0;
+    struct sigaction mine = {};
+    mine.sa_handler = pass_on;
+    sigaction(SIGINT, &mine, &before_int_), sigaction(SIGTERM, &mine, &before_term_);
+}
+StopRequest::~StopRequest() { sigaction(SIGINT, &before_int_, nullptr), sigaction(SIGTERM, &before_term_, nullptr); }
+bool StopRequest::came() const { return stop_signal != 0; }
+
 ChildResult run_child(const std::vector<std::string>& arguments, const io::Path& log)
 {
     // The child starts MPI anew: what this process's MPI left in the environment is not for it.
@@ -42,10 +51,6 @@ ChildResult run_child(const std::vector<std::string>& arguments, const io::Path&
     for (auto& w : words) argv.push_back(w.data());
     argv.push_back(nullptr);
 
-    stop_signal = 0;
-    struct sigaction mine = {}, before_int = {}, before_term = {};
-    mine.sa_handler = pass_on;
-    sigaction(SIGINT, &mine, &before_int), sigaction(SIGTERM, &mine, &before_term);
     const pid_t pid = fork();
     if (pid == 0) {
         const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
@@ -62,7 +67,6 @@ ChildResult run_child(const std::vector<std::string>& arguments, const io::Path&
     struct rusage used = {};
     while (wait4(pid, &status, 0, &used) < 0 && errno == EINTR) {}
     child_pid = 0;
-    sigaction(SIGINT, &before_int, nullptr), sigaction(SIGTERM, &before_term, nullptr);
     ChildResult r;
     r.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace kuzure::study {
 
@@ -71,7 +72,13 @@ public:
         double work_left = 0, work_done = 0, seconds_done = 0;
         for (const auto* p : todo) work_left += p->predicted_work;
         const auto begin = std::chrono::steady_clock::now();
+        std::optional<StopRequest> stop(std::in_place); // for as long as points are run
+        const auto stopped = [&] {
+            say("stopped on request; the same command goes on from here");
+            return Exit::Stopped;
+        };
         for (std::size_t k = 0; k < todo.size(); ++k) {
+            if (stop->came()) return stopped();
             Point& p = *todo[k];
             if (args_.max_minutes > 0 && std::chrono::steady_clock::now() - begin > std::chrono::duration<double>(60 * args_.max_minutes)) {
                 p.message = "not run yet: --max-minutes are over; the same command goes on";
@@ -82,8 +89,7 @@ public:
             if (take_what_is_there(folder(p), p)) {
                 say(head + ": the same scene as a point before");
             } else if (!run(p, threads)) {
-                say("stopped on request; the same command goes on from here");
-                return Exit::Stopped;
+                return stopped();
             } else {
                 work_done += p.predicted_work, seconds_done += p.core_seconds;
                 const double left = work_done > 0 ? seconds_done / work_done * (work_left - p.predicted_work) / threads : 0;
@@ -96,6 +102,7 @@ public:
             }
             work_left -= p.predicted_work;
         }
+        stop.reset();
 
         for (auto& p : study_.points) {
             if (!p.finished()) continue;
