@@ -42,11 +42,14 @@ inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vec
 } acceleration;
 inline constexpr struct StressRate : Field<"stress_rate", "Pa/s", Shape::Symmetric> {
 } stress_rate;
-// Only where there are Coulomb walls: elastic slip, and the acceleration by which a wall holds the particle (0: no contact).
+// Only where there are Coulomb walls: elastic slip, the acceleration by which a wall holds the particle (0: no contact), and the most
+// that friction carries.
 inline constexpr struct WallSlip : Field<"wall_slip", "m", Shape::Vector> {
 } wall_slip;
 inline constexpr struct WallPressure : Field<"wall_pressure", "m/s^2", Shape::Scalar> {
 } wall_pressure;
+inline constexpr struct WallFriction : Field<"wall_friction", "m/s^2", Shape::Scalar> {
+} wall_friction;
 // State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
 } half_velocity;
@@ -73,7 +76,7 @@ enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
 using AllFields =
     std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
-               field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::HalfVelocity, field::HalfDensity,
-               field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+               field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction, field::HalfVelocity,
+               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -20,8 +20,8 @@ protected:
         Vec3<S> held, pressing; // sum f P (sigma_i grad W); of Coulomb faces apart
         S limit;                // sum f tan(delta) n.(sigma_i grad W)
         S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
-        S area;                 // sum f n.grad W of Coulomb faces
-        S nearest, sunk;        // square of the distance to the nearest wall point; how far behind its face
+        Vec3<S> area;           // sum f (n.grad W) n of Coulomb faces
+        S nearest, sunk, grip;  // square of the distance to the nearest wall point; how far behind its face; tan(delta) there
         Vec3<S> out;            // that face's normal
     };
     template <class S>
@@ -133,9 +133,10 @@ private:
             const V along = dot(traction, m.normal), facing = slides * dot(g, m.normal);
             sums.limit = fma(slides * m.tangent, along, sums.limit);
             sums.approach = fma(facing, dot(velocity, m.normal), sums.approach);
-            sums.area = sums.area + facing;
+            sums.area = fma(facing, m.normal, sums.area);
             const auto nearer = less(r2, sums.nearest);
             sums.nearest = min(sums.nearest, r2), sums.sunk = select(nearer, m.sunk, sums.sunk);
+            sums.grip = select(nearer, slides * m.tangent, sums.grip);
             sums.out = {select(nearer, m.normal.x, sums.out.x), select(nearer, m.normal.y, sums.out.y),
                         select(nearer, m.normal.z, sums.out.z)};
         });
@@ -243,9 +244,11 @@ private:
     static void forget_contact(Particles& p, const Lanes& lanes)
     {
         if (!p.has(field::wall_slip)) return;
-        const auto slip = p[field::wall_slip];
-        const auto pressure = p[field::wall_pressure];
-        for (Index i = lanes.at; i < lanes.at + lanes.n; ++i) slip.set(i, Vector{}), pressure.set(i, 0.0);
+        for (Index i = lanes.at; i < lanes.at + lanes.n; ++i) forget_contact(p, i);
+    }
+    static void forget_contact(Particles& p, Index i)
+    {
+        p[field::wall_slip].set(i, Vector{}), p[field::wall_pressure].set(i, 0.0), p[field::wall_friction].set(i, 0.0);
     }
     /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
     KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const
@@ -261,6 +264,7 @@ private:
         if (!p.has(field::wall_slip)) return held;
         const auto slip = p[field::wall_slip];
         const auto pressure = p[field::wall_pressure];
+        const auto limit = p[field::wall_friction];
         const auto v = std::as_const(p)[field::velocity];
         double out[3][width<U>] = {};
         const auto at = [&](U a, int k) { return lane(a, k); };
@@ -269,21 +273,22 @@ private:
             const Index i = lanes.at + k;
             const double s = at(scale, k);
             const Vector push{s * at(w.pressing.x, k), s * at(w.pressing.y, k), s * at(w.pressing.z, k)};
-            const double held_by = s * at(w.limit, k), area = s * at(w.area, k);
-            // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
-            const bool faces = area != 0, approached = s * at(w.approach, k) > 0, pressed = held_by > 0;
-            if (!faces || !(pressed || approached)) {
-                slip.set(i, Vector{}), pressure.set(i, 0.0);
+            const Vector faces = s * Vector{at(w.area.x, k), at(w.area.y, k), at(w.area.z, k)};
+            const double area = length(faces), held_by = s * at(w.limit, k);
+            if (!(area > 0)) {
+                forget_contact(p, i);
                 continue;
             }
-            const double size = length(push);
-            const Vector normal = size > 0 ? (1 / size) * push : Vector{};
+            // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
+            const bool pressed = held_by > 0, counts = pressed || s * at(w.approach, k) > 0;
             const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
+            const double presses = (counts ? held_by : 0) + at(push_out, k) * at(w.grip, k);
+            const double most = limit[i] + lag(in.dt, m.c_p, h_).take * presses;
             // a spring of the soil's own shear stiffness across half a smoothing length
-            const double stiffness = pressed ? m.shear * std::fabs(area) / (0.5 * h_) : 0;
-            const auto f = return_to_coulomb(slip[i], in.dt * v[i], normal, pressed ? size : 0, held_by, stiffness);
-            slip.set(i, f.slip), pressure.set(i, pressed ? size : 0.0);
-            out[0][k] = push.x + f.force.x, out[1][k] = push.y + f.force.y, out[2][k] = push.z + f.force.z;
+            const auto f = return_to_coulomb(slip[i], in.dt * v[i], (1 / area) * faces, most, m.shear * area / (0.5 * h_));
+            slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
+            const Vector all = counts ? push + f.force : f.force;
+            out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;
         }
         return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};
     }

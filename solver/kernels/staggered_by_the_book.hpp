@@ -185,7 +185,7 @@ struct Kept {
     Vector acceleration{};
     Stress stress_rate{};
     Vector slip{};
-    double pressed = 0;
+    double pressed = 0, friction = 0; // the latter: the most that it carries
     double plastic_strain = 0, opened = 0;
 };
 constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
@@ -195,6 +195,7 @@ struct Strain {
     Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
     Vector viscous{};      // acceleration, m/s^2
     bool beside_wall = false;
+    double friction = 0; // the most that it carries, without what this step's stress allows, m/s^2
 };
 inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
 {
@@ -232,7 +233,12 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         shown.x = w.x;
         const double Pi = viscosity(*viscous, s.how.h, here, shown, mirrored);
         pressure = pressure + (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
+        if (wall.surface == scene::Surface::Coulomb)
+            of_i.friction += std::tan(wall.friction_angle) * -i.volume * i.density * Pi * dot(grad, face.normal);
     }
+    // The limit of friction follows what presses: d limit/dt = (tan(delta) p - limit)/lag, lag = 4 h/c_p, implicit.
+    const double lag = 4 * s.how.h / s.soils[std::size_t(soil.soil[k])].c_p;
+    of_i.friction = dt > 0 ? (lag * kept.friction + dt * of_i.friction) / (lag + dt) : of_i.friction;
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
     if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
@@ -282,10 +288,11 @@ struct Forced {
     Vector acceleration, velocity;
     Stress stress_rate{};
     Vector slip{};
-    double pressed = 0;
-    Taken before, coming; // in the half step before and in the one to come
+    double pressed = 0, friction = 0; // m/s^2; the latter: the most that it carries
+    Taken before, coming;             // in the half step before and in the one to come
     std::int64_t pairs = 0;
-    enum class Contact { None, Sticks, Slides, Approached, LetGo } contact = Contact::None; // with Coulomb faces
+    enum class Contact { None, Presses, Approached, LetGo } contact = Contact::None; // with Coulomb faces
+    enum class Rubs { Not, Sticks, Slides } rubs = Rubs::Not;
 };
 /// `kept.acceleration` is the viscous one of this step; dt is its length, `next` that of the one to come, s.
 inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt,
@@ -298,7 +305,8 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     const Vector gravity = e.gravity.value_or(Vector{});
     Forced of_i;
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
-    double limit = 0, approach = 0, area = 0;
+    Vector area{};                          // of Coulomb faces, along their normals, 1/m
+    double limit = 0, approach = 0;
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         const Vector x_ij = i.x - soil.x[l];
         if (l == k || length(x_ij) >= 2 * s.how.h) continue;
@@ -324,24 +332,29 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         push = push + crossing(wall, face, traction);
         limit += std::tan(wall.friction_angle) * dot(traction, face.normal);
         const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
-        area -= facing, approach += facing * dot(i.v, face.normal);
+        area = area - facing * face.normal, approach += facing * dot(i.v, face.normal);
     }
     Vector by_walls = (1 / i.density) * held;
     // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
     // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
-    if (area != 0) {
-        of_i.contact = limit > 0 ? Forced::Contact::Sticks : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
-        if (limit > 0) {
-            const double size = length(push), stiffness = material.shear * std::fabs(area) / (s.how.h / 2);
-            const Vector n = (1 / size) * push;
+    if (length(area) > 0) {
+        of_i.contact = limit > 0 ? Forced::Contact::Presses : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
+        const bool felt = of_i.contact != Forced::Contact::LetGo;
+        const double lag = 4 * s.how.h / material.c_p, presses = felt ? limit / i.density : 0;
+        of_i.pressed = limit > 0 ? length(push) / i.density : 0;
+        of_i.friction = kept.friction + (dt > 0 ? dt / (lag + dt) : 1) * presses;
+        if (felt) by_walls = by_walls + (1 / i.density) * push;
+        if (of_i.friction > 0) {
+            const double stiffness = material.shear * length(area) / (s.how.h / 2) / i.density; // 1/s^2
+            const Vector n = (1 / length(area)) * area;
             Vector slip = kept.slip + dt * i.v;
             slip = slip - dot(slip, n) * n;
-            if (const double trial = stiffness * length(slip); trial > limit)
-                slip = (limit / trial) * slip, of_i.contact = Forced::Contact::Slides;
-            of_i.slip = slip, of_i.pressed = size / i.density;
-            push = push - stiffness * slip;
+            of_i.rubs = Forced::Rubs::Sticks;
+            if (const double trial = stiffness * length(slip); trial > of_i.friction)
+                slip = (of_i.friction / trial) * slip, of_i.rubs = Forced::Rubs::Slides;
+            of_i.slip = slip;
+            by_walls = by_walls - stiffness * slip;
         }
-        if (of_i.contact != Forced::Contact::LetGo) by_walls = by_walls + (1 / i.density) * push;
     }
     const Vector water = (-1 / material.density) * PoreWater::from(e).at(i.x).gradient;
     const Vector free = (1 / i.density) * (stress + art) + kept.acceleration + by_walls + gravity + water;

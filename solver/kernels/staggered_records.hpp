@@ -34,7 +34,7 @@ public:
     {
         p.require(field::acceleration);
         if (M::diffusive) p.require(field::stress_rate);
-        if (coulomb) p.require(field::wall_slip, field::wall_pressure);
+        if (coulomb) p.require(field::wall_slip, field::wall_pressure, field::wall_friction);
     }
     void start(Particles&) const override {}
     std::size_t bytes() const override

@@ -2,6 +2,7 @@
 // The strain stage of the staggered scheme: velocity gradient at mid-step, from it density, stress and plastic strain, and the viscous
 // force, which waits in the acceleration's column for the force stage.
 #include "solver/kernels/staggered_records.hpp"
+#include "solver/walls/friction.hpp"
 
 namespace kuzure {
 
@@ -37,6 +38,7 @@ protected:
     template <class S> struct StrainWalls {
         Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
         Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
+        S rubbing;                 // sum tan(delta) rho_i rho_j Pi n.grad W of Coulomb faces
         S walled;                  // not zero for a particle that feels a wall
     };
     template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
@@ -138,6 +140,7 @@ private:
                 const V approach = max(-dot(Pv, r), zero);
                 const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 sums.viscous = fma(pressure, project(m, g), sums.viscous);
+                sums.rubbing = fma(m.coulomb * m.tangent * pressure, dot(g, m.normal), sums.rubbing);
             }
         });
         widen<V>(sums, out);
@@ -172,7 +175,12 @@ private:
             const U volume = U(volume_) * soil.rho0 / rho; // a wall particle has the soil's
             at_walls = wall_gradient(in, w, lanes, -factor * volume);
             feels_wall = select(less(zero, abs(w.walled)), one, zero);
-            if constexpr (M::viscous) viscous = viscous - (per_rho * volume) * w.viscous;
+            U rubbing = zero;
+            if constexpr (M::viscous) {
+                viscous = viscous - (per_rho * volume) * w.viscous;
+                rubbing = -(per_rho * volume) * w.rubbing;
+            }
+            friction_lags(in, lanes, rubbing, soil.c);
         }
         if constexpr (M::corrected)
             if (model_.correct) {
@@ -262,6 +270,16 @@ private:
         const U pressed = select(less(zero, p[field::wall_pressure].template load<U>(lanes.at)), one, zero);
         const U use = select(less(scale * trace(w.sliding), zero), one, pressed) * scale;
         return {fma(use, w.sliding.x, L.x), fma(use, w.sliding.y, L.y), fma(use, w.sliding.z, L.z)};
+    }
+    /// The limit of friction loses its share of the step, and gains that of the viscous push; the force stage adds that of the stress.
+    KUZURE_INLINE void friction_lags(const StepInput& in, const Lanes& lanes, U rubbing, U c_p) const
+    {
+        if (!in.particles->has(field::wall_friction)) return;
+        const auto limit = (*in.particles)[field::wall_friction];
+        const Lag<U> of = lag(in.dt, c_p, h_);
+        const U was = std::as_const(*in.particles)[field::wall_friction].template load<U>(lanes.at);
+        const U next = fma(of.keep, was, of.take * rubbing);
+        limit.store(lanes.at, in.sleep == SleepStage::Frozen ? select(written<U>(lanes), next, was) : next, lanes.n);
     }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
     {

@@ -737,7 +737,7 @@ double column_bytes(const Scene& scene, const Filling& filling)
         if (is(field::half_velocity, field::half_density, field::half_stress)) return leap_frog;
         if (is(field::acceleration)) return !leap_frog;
         if (is(field::stress_rate)) return !leap_frog && scene.effects.stress_diffusion.has_value();
-        if (is(field::wall_slip, field::wall_pressure)) return !leap_frog && coulomb;
+        if (is(field::wall_slip, field::wall_pressure, field::wall_friction)) return !leap_frog && coulomb;
         if (is(field::opened_volume)) return remembers;
         if (is(field::activity)) return scene.accuracy.sleep_below > 0;
         return true;

@@ -53,7 +53,7 @@ void repeat_walls(Cloud& c)
 // ---- the state -----------------------------------------------------------------------------------------------------------
 /// Columns that a cloud has not, from the particles' ids.
 struct State {
-    double rate, slip;                // Pa/s, m
+    double rate, slip, pressure;      // Pa/s, m, m/s^2
     std::vector<std::uint8_t> walled; // by id: slip and pressure are kept of particles at walls alone
     void operator()(Particles& p) const
     {
@@ -67,7 +67,11 @@ struct State {
             const double there = walled[std::size_t(p[field::id][i])];
             const Vector slipped = there * slip * Vector{u(), u(), u()};
             const double pressed = there * std::max(u(), 0.0);
-            if (p.has(field::wall_slip)) p[field::wall_slip].set(i, slipped), p[field::wall_pressure].set(i, pressed);
+            const double most = there * pressure * u(); // negative where the wall has pulled
+            if (p.has(field::wall_slip)) {
+                p[field::wall_slip].set(i, slipped), p[field::wall_pressure].set(i, pressed);
+                p[field::wall_friction].set(i, most);
+            }
             if (p.has(field::opened_volume)) p[field::opened_volume].set(i, i % 4 ? 0 : 1e-5 * std::fabs(u()));
         }
     }
@@ -78,19 +82,18 @@ struct Read {
     std::vector<book::Strain> strain;
     std::vector<book::Strained> strained;
     std::vector<book::Forced> forced;
-    int contacts[5] = {};
+    int contacts[4] = {}, rubs[3] = {};
 };
 struct Steps {
     double dt, next; // s
 };
+double sound_of(const Cloud& c) { return std::ranges::max(c.soils, {}, &Material::c_p).c_p; }
 /// A step in which the fastest particle goes a tenth of h, if P-waves go no further than two.
 Steps steps(const Cloud& c)
 {
     double fastest = 0;
     for (Index i = 0; i < c.particles.size(); ++i) fastest = std::max(fastest, length(std::as_const(c.particles)[field::velocity][i]));
-    double sound = 0;
-    for (const auto& m : c.soils) sound = std::max(sound, m.c_p);
-    const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest, 2 / sound);
+    const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest, 2 / sound_of(c));
     return {dt, 0.7 * dt};
 }
 State state_of(const Cloud& c)
@@ -99,7 +102,7 @@ State state_of(const Cloud& c)
     const double support2 = c.scene.support() * c.scene.support();
     // A model may hold more terms than its scene asks for: without diffusion there is no rate of it.
     State state{c.scene.effects.stress_diffusion ? 1e3 / steps(c).dt : 0, 1e-5 * c.scene.space.spacing,
-                std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
+                0.1 * sound_of(c) * sound_of(c) / c.scene.smoothing_length(), std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
     for (Index i = 0; i < p.size(); ++i)
         for (const auto& w : c.walls)
             for (std::size_t k = 0; k < w.x.size(); ++k) {
@@ -117,7 +120,7 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
 {
     const Scene& s = other ? *other : c.scene;
     Particles p = c.particles;
-    p.require(field::acceleration, field::stress_rate, field::wall_slip, field::wall_pressure, field::opened_volume);
+    p.require(field::acceleration, field::stress_rate, field::wall_slip, field::wall_pressure, field::wall_friction, field::opened_volume);
     state_of(c)(p);
     const bool coulomb = std::ranges::any_of(c.scene.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; });
     std::vector<Vector> x, v;
@@ -132,9 +135,10 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
                      s.effects.stress_diffusion ? p[field::stress_rate][i] : Stress{},
                      {},
                      0,
+                     0,
                      p[field::plastic_strain][i],
                      p[field::opened_volume][i]};
-        if (coulomb) k.slip = p[field::wall_slip][i], k.pressed = p[field::wall_pressure][i];
+        if (coulomb) k.slip = p[field::wall_slip][i], k.pressed = p[field::wall_pressure][i], k.friction = p[field::wall_friction][i];
         kept.push_back(k);
     }
     const auto ground = book::ground(s.walls, period_of(s), s.dimensions, s.space.spacing);
@@ -154,9 +158,10 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         read.strain.push_back(book::strain_of(i, ground_soil, kept[i], points, setting, planted.at_end_of_step ? 0 : dt));
         read.strained.push_back(book::strained(particle, c.soils[std::size_t(soil[i])], kept[i], read.strain.back(), setting, dt));
         book::Kept forced = kept[i];
-        forced.acceleration = book::strain_of(i, ground_soil, kept[i], points, setting, 0).viscous;
+        const auto at_start = book::strain_of(i, ground_soil, kept[i], points, setting, 0);
+        forced.acceleration = at_start.viscous, forced.friction = at_start.friction;
         read.forced.push_back(book::force_on(i, ground_soil, forced, points, setting, dt, next));
-        ++read.contacts[int(read.forced.back().contact)];
+        ++read.contacts[int(read.forced.back().contact)], ++read.rubs[int(read.forced.back().rubs)];
     }
     return read;
 }
@@ -168,13 +173,13 @@ double norm(const Stress& s) { return std::sqrt(contract(s, s)); }
 /// Largest differences, each over what its sums may lose to rounding: the largest value, or what the largest stress or speed makes of
 /// one neighbour.
 struct Difference {
-    double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0;         // strain
-    double acceleration = 0, velocity = 0, rate = 0, slip = 0, pressure = 0; // force
-    double strain_energy[3] = {}, before[4] = {}, later[4] = {};             // energies
+    double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0;                       // strain
+    double acceleration = 0, velocity = 0, rate = 0, slip = 0, pressure = 0, friction = 0; // force
+    double strain_energy[3] = {}, before[4] = {}, later[4] = {};                           // energies
     std::int64_t pairs = 0;
     double largest() const
     {
-        double most = std::max({L, stress, density, plastic, viscous, acceleration, velocity, pressure}); // but for rate and slip
+        double most = std::max({L, stress, density, plastic, viscous, acceleration, velocity, pressure, friction}); // but for rate and slip
         for (const auto e : strain_energy) most = std::max(most, e);
         for (int k = 0; k < 4; ++k) most = std::max({most, before[k], later[k]});
         return most;
@@ -184,7 +189,7 @@ std::ostream& operator<<(std::ostream& to, const Difference& d)
 {
     to << "L " << d.L << " stress " << d.stress << " density " << d.density << " plastic strain " << d.plastic << " viscous " << d.viscous
        << " a " << d.acceleration << " v " << d.velocity << " stress rate " << d.rate << " slip " << d.slip << " pressure " << d.pressure
-       << " pairs " << d.pairs << " energies of strain";
+       << " friction " << d.friction << " pairs " << d.pairs << " energies of strain";
     for (const auto e : d.strain_energy) to << " " << e;
     to << " of force";
     for (int k = 0; k < 4; ++k) to << " " << d.before[k] << " " << d.later[k];
@@ -243,6 +248,8 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         if (!f.has(field::wall_slip)) continue;
         note(d.slip, length(f[field::wall_slip][i] - forced.slip), speed * dt);
         note(d.pressure, std::fabs(f[field::wall_pressure][i] - forced.pressed), of_a);
+        note(d.friction, std::fabs(f[field::wall_friction][i] - forced.friction), of_a);
+        note(d.friction, std::fabs(s[field::wall_friction][i] - strain.friction), of_a);
     }
     for (const auto& g : pass.strain.worked) {
         double plastic = 0, stabilising = 0, wall = 0;
@@ -312,7 +319,7 @@ TEST(StaggeredByTheBook, EveryModelFarFromWalls)
 
 TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
 {
-    int contacts[5] = {}, arrangement = 0;
+    int contacts[4] = {}, rubs[3] = {}, arrangement = 0;
     const auto hold = [&](const Scene& s, const std::string& what) {
         auto arranged = Arrangement(arrangement++ % 6); // another one for each wall and model
         // on a lattice particles lie in the planes of a step's edge, in front of which they may be or not by their last digits
@@ -323,7 +330,8 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
         EXPECT_GT(clear, 0) << what;
         EXPECT_LT(clear, c.particles.size() - 10) << what;
         expect_by_the_book(c, read, what + ", " + arrangements[arranged]);
-        for (int k = 0; k < 5; ++k) contacts[k] += read.contacts[k];
+        for (int k = 0; k < 4; ++k) contacts[k] += read.contacts[k];
+        for (int k = 0; k < 3; ++k) rubs[k] += read.rubs[k];
     };
     for (const Scene& bare : scenes(staggered)) {
         Scene s = bare;
@@ -345,9 +353,10 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
         hold(s, "corner");
     }
     // every branch of Coulomb's law has been taken
-    for (const auto contact :
-         {book::Forced::Contact::Sticks, book::Forced::Contact::Slides, book::Forced::Contact::Approached, book::Forced::Contact::LetGo})
+    using book::Forced;
+    for (const auto contact : {Forced::Contact::Presses, Forced::Contact::Approached, Forced::Contact::LetGo})
         EXPECT_GT(contacts[int(contact)], 50) << int(contact);
+    for (const auto rub : {Forced::Rubs::Not, Forced::Rubs::Sticks, Forced::Rubs::Slides}) EXPECT_GT(rubs[int(rub)], 50) << int(rub);
 }
 
 TEST(StaggeredByTheBook, PoreWaterAndNoGravity)

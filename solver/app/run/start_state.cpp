@@ -70,7 +70,7 @@ StartState start_state(const Comm& comm, const Scene& scene, const scene::Fillin
         }());
     };
     take(field::position, field::velocity, field::density, field::stress, field::plastic_strain, field::opened_volume, field::wall_slip,
-         field::wall_pressure, field::stress_rate, field::id);
+         field::wall_pressure, field::wall_friction, field::stress_rate, field::id);
     p.require(field::origin, field::sorted_position, field::soil);
     for (Index i = 0; i < p.size(); ++i) {
         const Vector x = std::as_const(p)[field::position][i];
