@@ -1,6 +1,7 @@
 #pragma once
 // The ranks that work on one run, as everything outside decomposition/ sees them: no MPI type in sight.
 // decomposition::Comm implements it over MPI; SingleRank is the one-rank team of tests and of the library without MPI.
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -48,6 +49,13 @@ public:
     {
         min(std::span(&v, 1));
         return v;
+    }
+    /// In no fixed order. Floating point alone, so that a number of seconds is not cut to whole ones.
+    template <std::floating_point F> double sum(F v) const
+    {
+        double all = v;
+        sum(std::span(&all, 1));
+        return all;
     }
     std::int64_t sum(std::int64_t v) const
     {

@@ -91,10 +91,15 @@ std::string state_hash(const Team& team, const Particles& p)
     for (Index i = 0; i < n; ++i) h[i] = mix(std::uint64_t(id[i]) + 0x9e3779b97f4a7c15ull);
     p.for_each_present([&](auto f) {
         using F = decltype(f);
-        if constexpr (std::is_same_v<typename F::Number, double> && !std::is_same_v<F, std::remove_const_t<decltype(field::origin)>>) {
+        const auto is = [](auto... g) { return (std::is_same_v<F, std::remove_const_t<decltype(g)>> || ...); };
+        // not what never changes: where it began, id and soil
+        if constexpr (!is(field::origin, field::id, field::soil)) {
             const auto columns = p[f];
-            for (const double* c : columns.column)
-                for (Index i = 0; i < n; ++i) h[i] = mix(h[i] ^ std::bit_cast<std::uint64_t>(c[i] + 0.0));
+            for (const auto* c : columns.column)
+                for (Index i = 0; i < n; ++i) {
+                    if constexpr (std::is_same_v<typename F::Number, double>) h[i] = mix(h[i] ^ std::bit_cast<std::uint64_t>(c[i] + 0.0));
+                    else h[i] = mix(h[i] ^ std::uint64_t(c[i]));
+                }
         }
     });
     std::uint64_t sum = 0;

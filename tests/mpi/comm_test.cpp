@@ -18,6 +18,7 @@ TEST(Comm, IsATeam)
     const Team& team = world();
     const int rank = team.rank(), size = team.size();
     EXPECT_EQ(team.sum(std::int64_t(rank)), std::int64_t(size) * (size - 1) / 2);
+    EXPECT_EQ(team.sum(0.25), 0.25 * size);
     EXPECT_EQ(team.max(double(rank)), size - 1);
     EXPECT_EQ(team.min(double(rank)), 0);
     EXPECT_EQ(team.max(std::int64_t(-rank)), 0);
