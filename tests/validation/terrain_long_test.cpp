@@ -33,7 +33,7 @@ TEST(TerrainLong, CapKeepsItsShape)
     const double spacing = 4 / c35 / 8; // eight layers
     GroundScene g;
     g.text.spacing = spacing, g.text.end = end, g.text.young = 5e7, g.text.density = 2000;
-    g.text.strength = "friction_angle = 25.0";
+    g.text.strength = "friction_angle = 25.0\ncone = \"shear\""; // sheared, it carries what the bed does: the theory's phi = delta
     g.friction = 25;
     g.ground = heights([&](double x, double) { return -fall * x; }, {-110, -130}, {160, 130}, 2.0);
     g.thicknesses = std::make_shared<scene::Grid>(heights(
