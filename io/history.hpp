@@ -1,6 +1,8 @@
 #pragma once
 // history.csv: what the soil did, a row an interval; progress.csv: how fast the run went.
 #include "io/rows.hpp"
+#include "solver/core/tensor.hpp"
+#include <vector>
 
 namespace kuzure::io {
 
@@ -14,6 +16,7 @@ struct HistoryRow {
     double max_speed;                                                    // m/s
     double height, front_min_x, front_max_x, front_min_y, front_max_y;   // m
     double stabilising, moved_wall; // J; work of artificial stress and stress diffusion, of walls that move
+    double events;                  // J, that events have taken
 };
 
 class History : public Rows {
@@ -22,6 +25,54 @@ public:
     History(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
     /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
     void append(const HistoryRow&);
+};
+
+/// events.csv: what happened, a row an event.
+struct EventRow {
+    double time;       // s
+    std::int64_t step; // 1
+    int event;         // number in the scene file
+    std::string what;
+    double taken; // J, by all events of this time
+};
+class EventLog : public Rows {
+public:
+    /// Collective. As Rows.
+    EventLog(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
+    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
+    void append(const std::vector<EventRow>&);
+};
+
+/// forces.csv: what soil does to a named wall, a row a wall at each time; in 2-D per metre of thickness.
+struct ForceRow {
+    double time; // s
+    std::string wall;
+    Vector force, moment, impulse; // N, N m about the scene's origin, N s since the start
+};
+class ForceLog : public Rows {
+public:
+    /// Collective. As Rows.
+    ForceLog(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
+    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
+    void append(const std::vector<ForceRow>&);
+};
+
+/// probes.csv: a row a probe at each time.
+struct ProbeRow {
+    double time; // s
+    std::string probe;
+    std::int64_t particles;
+    Vector position, velocity; // m, m/s
+    double density;            // kg/m^3
+    Stress stress;             // Pa
+    double plastic_strain;     // 1
+};
+class ProbeLog : public Rows {
+public:
+    /// Collective. As Rows.
+    ProbeLog(const Team&, const Place& file, std::optional<double> restart_time = {});
+    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
+    void append(const std::vector<ProbeRow>&);
 };
 
 /// How fast a run goes. It differs from run to run: nothing of it is in history.csv, whose bits do not.

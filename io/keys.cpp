@@ -83,12 +83,18 @@ const Key* KeyTable::find(std::string_view path) const { return row(pattern_of(p
 
 std::string KeyTable::pattern_of(std::string_view path) const
 {
-    const auto first = path.find('.');
-    const auto head = path.substr(0, first);
-    const Key* many = first == path.npos ? nullptr : row(head);
-    if (!many || (many->kind != Kind::Named && many->kind != Kind::Tables)) return std::string(path);
-    const auto second = path.find('.', first + 1);
-    return std::string(head) + ".*" + std::string(second == path.npos ? "" : path.substr(second));
+    std::string pattern;
+    bool name = false; // what comes next is one, or a number
+    for (std::size_t at = 0; at <= path.size();) {
+        const auto end = std::min(path.find('.', at), path.size());
+        const auto part = path.substr(at, end - at);
+        at = end + 1;
+        if (!pattern.empty()) pattern += '.';
+        pattern += name ? "*" : part;
+        const Key* here = name ? nullptr : row(pattern);
+        name = here && (here->kind == Kind::Named || here->kind == Kind::Tables);
+    }
+    return pattern;
 }
 
 const std::vector<const Key*>& KeyTable::inside(std::string_view pattern) const
@@ -196,9 +202,10 @@ std::string not_simulated(std::string_view written)
         {"vegetation", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
         {"root", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
         {"tree", "Plants are not simulated; give the cohesion that roots lend the soil as that of a soil of its own."},
-        {"earthquake", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
-        {"seismic", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
-        {"quake", "Shaking ground is not simulated; a steady sideways part of effects.gravity is (pseudo-static)."},
+        {"earthquake",
+         "Shaking ground is an event: [[event]] shaking = \"record.csv\"; a steady sideways part of gravity is pseudo-static."},
+        {"seismic", "Shaking ground is an event: [[event]] shaking = \"record.csv\"; a steady sideways part of gravity is pseudo-static."},
+        {"quake", "Shaking ground is an event: [[event]] shaking = \"record.csv\"; a steady sideways part of gravity is pseudo-static."},
         {"temperature", "Heat is not simulated: soil keeps its properties."},
         {"thermal", "Heat is not simulated: soil keeps its properties."},
         {"heat", "Heat is not simulated: soil keeps its properties."},

@@ -141,6 +141,20 @@ template <class A> void describe_terrain(A& a, std::optional<scene::Terrain>& te
            });
 }
 
+inline Words<scene::Cone> cone_words()
+{
+    return {{"compression", scene::Cone::Compression},
+            {"extension", scene::Cone::Extension},
+            {"plane strain", scene::Cone::PlaneStrain},
+            {"plane strain, no dilation", scene::Cone::PlaneStrainNoDilation},
+            {"shear", scene::Cone::Shear}};
+}
+/// Of a body or wall.
+inline KeyInfo name_info(const char* example)
+{
+    return {.optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall or body has it"};
+}
+
 template <class A> void describe_soil(A& a, const std::string& path, scene::Soil& soil)
 {
     a.number(path + ".density", soil.density,
@@ -153,12 +167,7 @@ template <class A> void describe_soil(A& a, const std::string& path, scene::Soil
             {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "25.0", .doc = "friction angle phi"});
     a.angle(path + ".dilation_angle", soil.dilation_angle,
             {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "0.0", .doc = "dilation angle psi, at most phi"});
-    a.choice(path + ".cone", soil.cone,
-             {{"compression", scene::Cone::Compression},
-              {"extension", scene::Cone::Extension},
-              {"plane strain", scene::Cone::PlaneStrain},
-              {"plane strain, no dilation", scene::Cone::PlaneStrainNoDilation},
-              {"shear", scene::Cone::Shear}},
+    a.choice(path + ".cone", soil.cone, cone_words(),
              {.fallback = "\"compression\"",
               .example = "\"compression\"",
               .doc = "how the Drucker-Prager cone is fitted to c and phi (docs/theory.md)"});
@@ -348,6 +357,86 @@ template <class A> void describe_output(A& a, scene::Output& output)
            {.fallback = "false", .example = "true", .doc = "the pictures as a film at the end (needs ffmpeg)"});
 }
 
+/// What an event makes of a soil.
+template <class A> void describe_soil_change(A& a, const std::string& path, scene::SoilChange& soil)
+{
+    a.number(path + ".young", soil.young, {.unit = "Pa", .range = above(0), .example = "1.0e6", .doc = "Young's modulus from then on"});
+    a.number(path + ".poisson", soil.poisson,
+             {.unit = "1", .range = from_below(0, 0.5), .example = "0.3", .doc = "Poisson's ratio from then on"});
+    a.number(path + ".cohesion", soil.cohesion, {.unit = "Pa", .range = from(0), .example = "500.0", .doc = "cohesion from then on"});
+    a.angle(path + ".friction_angle", soil.friction_angle,
+            {.unit = "deg", .range = from_below(0, 90), .example = "20.0", .doc = "friction angle from then on"});
+    a.angle(path + ".dilation_angle", soil.dilation_angle,
+            {.unit = "deg", .range = from_below(0, 90), .example = "0.0", .doc = "dilation angle from then on"});
+    a.number(path + ".tension_cutoff", soil.tension_cutoff,
+             {.unit = "Pa", .range = from(0), .example = "0.0", .doc = "largest mean tension from then on"});
+    a.choice(path + ".cone", soil.cone, cone_words(), {.optional = true, .example = "\"plane strain\"", .doc = "cone from then on"});
+    a.number(path + ".strength", soil.strength,
+             {.unit = "1",
+              .range = above_to(0, 1e6),
+              .example = "0.8",
+              .doc = "factor of cohesion, tan(friction_angle) and tension_cutoff; the dilation angle stays at most the friction angle"});
+    a.number(path + ".stiffness", soil.stiffness,
+             {.unit = "1", .range = above_to(0, 1e6), .example = "0.5", .doc = "factor of Young's modulus"});
+}
+
+template <class A> void describe_events(A& a, Scene& s)
+{
+    a.tables(
+        "event", s.events, {.optional = true, .example = "[[event]]", .doc = "a change while the run goes on (docs/stages.md)"},
+        [&](const std::string& path, scene::Event& e) {
+            a.number(path + ".at", e.at,
+                     {.unit = "s", .range = above(0), .example = "2.0", .doc = "when it happens, at the boundary of two steps"});
+            a.number(path + ".from", e.from,
+                     {.unit = "s", .range = from(0), .example = "2.0", .doc = "instead of at: when a linear change begins"});
+            a.number(path + ".to", e.to, {.unit = "s", .range = above(0), .example = "3.0", .doc = "when it is complete"});
+            a.some_names(path + ".remove", e.remove,
+                         {.optional = true, .example = "\"gate\"", .doc = "names of walls and bodies that go, or one of them"});
+            a.some_names(path + ".add", e.add,
+                         {.optional = true,
+                          .example = "\"lift\"",
+                          .doc = "names of walls and bodies that come: they are not there before, the soil is as its body says"});
+            a.vector(path + ".gravity", e.gravity,
+                     {.unit = "m/s^2", .range = between(-1e6, 1e6), .example = "[2.0, 0.0, -9.81]", .doc = "gravity from then on"});
+            a.text(path + ".shaking", e.shaking.file,
+                   {.optional = true,
+                    .example = "\"record.csv\"",
+                    .doc =
+                        "acceleration of the ground from at on: a .csv with the columns time, x, y, z in s and m/s^2; soil and walls are "
+                        "seen from that ground",
+                    .role = Role::Bookkeeping}); // its content counts
+            a.points(path + ".water", e.water,
+                     {.unit = "m",
+                      .range = coordinate,
+                      .optional = true,
+                      .example = "[[0.0, 4.0], [20.0, 1.0]]",
+                      .doc = "the water table of effects.pore_pressure from then on"});
+            a.number(path + ".damping", e.damping,
+                     {.unit = "of critical",
+                      .range = between(0, 10),
+                      .example = "0.05",
+                      .doc = "damping as effects.damping, from then on; 0: none"});
+            a.soil_changes(path + ".soil", e.soils, s.soils,
+                           {.optional = true, .example = "[event.soil.sand]", .doc = "what a soil becomes; only what is written changes"},
+                           [&](const std::string& p, scene::SoilChange& soil) { describe_soil_change(a, p, soil); });
+        });
+    a.tables("probe", s.probes,
+             {.optional = true,
+              .example = "[[probe]]",
+              .doc = "a row a time of output.history in probes.csv: of a place, a particle or the mean of a body (docs/stages.md)",
+              .role = Role::Bookkeeping},
+             [&](const std::string& path, scene::Probe& p) {
+                 a.text(path + ".name", p.name,
+                        {.optional = true, .example = "\"toe\"", .doc = "what the rows are called; without it its number"});
+                 a.vector(path + ".point", p.point,
+                          {.unit = "m", .range = coordinate, .example = "[1.0, 0.0, 0.5]", .doc = "a place: what the soil around it is"});
+                 a.integer(path + ".particle", p.particle,
+                           {.range = between(0, 2147483647), .example = "1200", .doc = "a particle of soil by its id"});
+                 a.text(path + ".body", p.body,
+                        {.optional = true, .example = "\"block\"", .doc = "the name of a body: the mean of its particles by mass"});
+             });
+}
+
 template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
 {
     a.part("maps", maps,
@@ -425,6 +514,7 @@ template <class A> void describe(A& a, Scene& s)
                  a.choice(
                      path + ".stress", body.stress, {{"none", scene::InitialStress::None}, {"at rest", scene::InitialStress::AtRest}},
                      {.fallback = "\"none\"", .example = "\"none\"", .doc = "stress at the start; \"at rest\" is K0 under its own weight"});
+                 a.text(path + ".name", body.name, name_info("\"slope\""));
              });
     a.tables("wall", s.walls, {.optional = true, .example = "[[wall]]", .doc = "fixed particles of one shape"},
              [&](const std::string& path, scene::Wall& wall) {
@@ -439,6 +529,7 @@ template <class A> void describe(A& a, Scene& s)
                          a.angle(p + ".friction_angle", wall.friction_angle,
                                  {.unit = "deg", .range = from_below(0, 90), .example = "20.0", .doc = "Coulomb friction of the wall"});
                      });
+                 a.text(path + ".name", wall.name, name_info("\"gate\""));
              });
 
     describe_terrain(a, s.terrain);
@@ -454,6 +545,7 @@ template <class A> void describe(A& a, Scene& s)
     describe_effects(a, s.effects);
     describe_accuracy(a, s.accuracy);
     describe_maps(a, s.maps);
+    describe_events(a, s);
     describe_output(a, s.output);
 }
 

@@ -1,6 +1,7 @@
 #include "io/scene_file.hpp"
 #include "io/document.hpp"
 #include "io/ground/ground.hpp"
+#include "io/ground_motion.hpp"
 #include "io/scene_description.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
@@ -39,6 +40,10 @@ public:
         if (!k.optional || file_.find(path)) to = file_.text(path);
     }
     void integer(const std::string& path, int& to, const KeyInfo&) { to = file_.integer(path); }
+    void integer(const std::string& path, std::optional<int>& to, const KeyInfo& k)
+    {
+        optionally(path, to, [&](int& n) { integer(path, n, k); });
+    }
     void flag(const std::string& path, bool& to, const KeyInfo&) { to = file_.at(path).as_boolean()->get(); }
     void number(const std::string& path, double& to, const KeyInfo& k)
     {
@@ -51,6 +56,10 @@ public:
     void angle(const std::string& path, double& to, const KeyInfo& k)
     {
         if (!k.optional || file_.find(path)) to = file_.number(path) * radians_per_degree;
+    }
+    void angle(const std::string& path, std::optional<double>& to, const KeyInfo& k)
+    {
+        optionally(path, to, [&](double& x) { angle(path, x, k); });
     }
     void vector(const std::string& path, Vector& to, const KeyInfo&)
     {
@@ -73,14 +82,19 @@ public:
     {
         to = file_.at(path).is_string() ? std::vector{file_.text(path)} : file_.texts(path);
     }
+    void some_names(const std::string& path, std::vector<std::string>& to, const KeyInfo& k)
+    {
+        if (file_.find(path)) files(path, to, k);
+    }
     void window(const std::string& path, std::optional<std::array<double, 4>>& to, const KeyInfo&)
     {
         optionally(path, to, [&](std::array<double, 4>& w) {
             for (std::size_t k = 0; k < 4; ++k) w[k] = number_of(*file_.at(path).as_array()->get(k));
         });
     }
-    void points(const std::string& path, std::vector<std::array<double, 2>>& to, const KeyInfo&)
+    void points(const std::string& path, std::vector<std::array<double, 2>>& to, const KeyInfo& k)
     {
+        if (k.optional && !file_.find(path)) return;
         for (const auto& p : *file_.at(path).as_array()) to.push_back({number_of(*p.as_array()->get(0)), number_of(*p.as_array()->get(1))});
     }
     void axes(const std::string& path, std::array<bool, 3>& to, const KeyInfo&)
@@ -95,6 +109,11 @@ public:
     template <class Enum> void choice(const std::string& path, Enum& to, const std::type_identity_t<Words<Enum>>& words, const KeyInfo&)
     {
         to = file_.choice(path, words);
+    }
+    template <class Enum>
+    void choice(const std::string& path, std::optional<Enum>& to, const std::type_identity_t<Words<Enum>>& words, const KeyInfo& k)
+    {
+        optionally(path, to, [&](Enum& value) { choice(path, value, words, k); });
     }
     template <class Enum, class Describe>
     void choice_or_table(const std::string& path, Enum& to, const std::type_identity_t<Words<Enum>>& words, Enum table, const KeyInfo&,
@@ -129,9 +148,28 @@ public:
         for (auto& name : file_.names(path)) to.emplace_back().name = std::move(name);
         for (auto& soil : to) describe(path + "." + soil.name, soil);
     }
+    template <class Describe>
+    void soil_changes(const std::string& path, std::vector<scene::SoilChange>& to, const std::vector<scene::Soil>& soils, const KeyInfo&,
+                      Describe describe)
+    {
+        for (const auto& name : file_.names(path)) {
+            auto& change = to.emplace_back();
+            find_soil(path + "." + name, name, change.soil, soils);
+            describe(path + "." + name, change);
+        }
+    }
     void soil_of(const std::string& path, int& to, const std::vector<scene::Soil>& soils, const KeyInfo&)
     {
-        const std::string& name = file_.text(path);
+        find_soil(path, file_.text(path), to, soils);
+    }
+    template <class T, class Describe> void alternative(const std::string& path, scene::Shape& shape, const KeyInfo&, Describe describe)
+    {
+        if (file_.find(path)) describe(path, shape.emplace<T>());
+    }
+
+private:
+    void find_soil(const std::string& path, const std::string& name, int& to, const std::vector<scene::Soil>& soils)
+    {
         std::vector<std::string> names;
         for (const auto& soil : soils) names.push_back(soil.name);
         const auto found = std::find(names.begin(), names.end(), name);
@@ -140,12 +178,6 @@ public:
             file_.complain(path, fmt::format("expected the name of a soil, found \"{}\"{} The soils here: {}. Or write [soil.{}]", name,
                                              did_you_mean(name, names), fmt::join(names, ", "), name));
     }
-    template <class T, class Describe> void alternative(const std::string& path, scene::Shape& shape, const KeyInfo&, Describe describe)
-    {
-        if (file_.find(path)) describe(path, shape.emplace<T>());
-    }
-
-private:
     template <class T, class Describe> void optionally(const std::string& path, std::optional<T>& to, Describe describe)
     {
         if (file_.find(path)) describe(to.emplace());
@@ -178,6 +210,17 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
         if (!path.empty()) path = std::filesystem::absolute(std::filesystem::path(name).parent_path() / path).lexically_normal().string();
     };
     absolute(scene.start.from);
+    for (std::size_t k = 0; k < scene.events.size(); ++k) {
+        auto& shaking = scene.events[k].shaking;
+        if (shaking.file.empty()) continue;
+        absolute(shaking.file);
+        try {
+            shaking.rows = std::make_shared<const std::vector<std::array<double, 4>>>(read_ground_motion(shaking.file));
+        } catch (const BadInput& e) {
+            file.complain(fmt::format("event.{}.shaking", k), e.what());
+        }
+    }
+    file.throw_if_any();
     if (scene.maps) absolute(scene.maps->points);
     if (scene.terrain)
         for (auto& dem : scene.terrain->dem) absolute(dem);

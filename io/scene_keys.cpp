@@ -39,6 +39,10 @@ public:
     void section(const char* path, const KeyInfo& k) { add(path, Kind::Table, k); }
     void text(const std::string& path, const std::string&, const KeyInfo& k) { add(path, Kind::Text, k); }
     void integer(const std::string& path, int, const KeyInfo& k) { add(path, Kind::Integer, k); }
+    void integer(const std::string& path, const std::optional<int>&, const KeyInfo& k)
+    {
+        add(path, Kind::Integer, k).need = Need::Optional;
+    }
     void flag(const std::string& path, bool, const KeyInfo& k) { add(path, Kind::Flag, k); }
     void number(const std::string& path, const double&, const KeyInfo& k) { add(path, Kind::Number, k); }
     void number(const std::string& path, const std::optional<double>&, const KeyInfo& k)
@@ -46,6 +50,10 @@ public:
         add(path, Kind::Number, k).need = Need::Optional;
     }
     void angle(const std::string& path, const double&, const KeyInfo& k) { add(path, Kind::Number, k); }
+    void angle(const std::string& path, const std::optional<double>&, const KeyInfo& k)
+    {
+        add(path, Kind::Number, k).need = Need::Optional;
+    }
     void vector(const std::string& path, const Vector&, const KeyInfo& k) { add(path, Kind::Vector, k); }
     void vector(const std::string& path, const std::optional<Vector>&, const KeyInfo& k)
     {
@@ -54,6 +62,7 @@ public:
     void pair(const std::string& path, const std::array<double, 2>&, const KeyInfo& k) { add(path, Kind::Pair, k); }
     void numbers(const std::string& path, const std::vector<double>&, const KeyInfo& k) { add(path, Kind::Numbers, k); }
     void files(const std::string& path, const std::vector<std::string>&, const KeyInfo& k) { add(path, Kind::TextOrTexts, k); }
+    void some_names(const std::string& path, const std::vector<std::string>&, const KeyInfo& k) { add(path, Kind::TextOrTexts, k); }
     void window(const std::string& path, const std::optional<std::array<double, 4>>&, const KeyInfo& k)
     {
         add(path, Kind::Window, k).need = Need::Optional;
@@ -71,6 +80,11 @@ public:
     void choice(const std::string& path, const Enum&, const std::type_identity_t<Words<Enum>>& words, const KeyInfo& k)
     {
         add(path, Kind::Choice, k).choices = choices_of(words);
+    }
+    template <class Enum>
+    void choice(const std::string& path, const std::optional<Enum>&, const std::type_identity_t<Words<Enum>>& words, const KeyInfo& k)
+    {
+        choice(path, Enum{}, words, k);
     }
     template <class Enum, class Describe>
     void choice_or_table(const std::string& path, const Enum&, const std::type_identity_t<Words<Enum>>& words, Enum, const KeyInfo& k,
@@ -108,6 +122,15 @@ public:
         add(path + ".*", Kind::Table, {.optional = true, .example = k.example, .doc = "one soil"});
         scene::Soil soil{};
         describe(path + ".*", soil);
+    }
+    template <class Describe>
+    void soil_changes(const std::string& path, const std::vector<scene::SoilChange>&, const std::vector<scene::Soil>&, const KeyInfo& k,
+                      Describe describe)
+    {
+        add(path, Kind::Named, k);
+        add(path + ".*", Kind::Table, {.optional = true, .example = k.example, .doc = "one soil"});
+        scene::SoilChange change{};
+        describe(path + ".*", change);
     }
     void soil_of(const std::string& path, int, const std::vector<scene::Soil>&, const KeyInfo& k) { add(path, Kind::Text, k); }
     template <class T, class Describe> void alternative(const std::string& path, const scene::Shape&, const KeyInfo& k, Describe describe)

@@ -75,6 +75,18 @@ std::string shown_default(const Key& key)
     return "`" + key.fallback + "`";
 }
 
+/// Tables that have a heading of their own.
+bool is_group(const Key& key)
+{
+    return key.kind == Kind::Named || key.kind == Kind::Tables || (key.kind == Kind::Table && key.path.find('.') == key.path.npos);
+}
+/// "event.*.soil" as a file writes it: "event.soil".
+std::string without_numbers(std::string path)
+{
+    for (auto at = path.find(".*"); at != path.npos; at = path.find(".*")) path.erase(at, 2);
+    return path;
+}
+
 // ---- JSON Schema ----
 
 Json json_of(const std::string& toml)
@@ -194,17 +206,18 @@ std::string scene_reference()
                       "Presence is the switch: what is not written is not simulated.\n";
     std::string section = "none";
     for (const Key& key : scene_keys()) {
-        const bool group =
-            key.kind == Kind::Named || key.kind == Kind::Tables || (key.kind == Kind::Table && key.path.find('.') == key.path.npos);
-        const std::string head = key.path.find('.') == key.path.npos ? "" : key.path.substr(0, key.path.find('.'));
-        const std::string here = group ? key.path : head;
-        if (key.path == "soil.*") continue;
+        const bool group = is_group(key);
+        if (key.path.ends_with(".*")) continue; // one of the named
+        std::string here = key.path;            // the nearest group around it
+        if (!group) do
+                here.resize(here.find('.') == here.npos ? 0 : here.rfind('.'));
+            while (!here.empty() && !(scene_keys().find(here) && is_group(*scene_keys().find(here))));
         if (here != section) {
             section = here;
             const Key* parent = here.empty() ? nullptr : scene_keys().find(here);
             const std::string title = !parent                        ? "Top level"
                                       : parent->kind == Kind::Tables ? fmt::format("`[[{}]]`", here)
-                                      : parent->kind == Kind::Named  ? fmt::format("`[{}.<name>]`", here)
+                                      : parent->kind == Kind::Named  ? fmt::format("`[{}.<name>]`", without_numbers(here))
                                                                      : fmt::format("`[{}]`", here);
             out += fmt::format("\n## {}\n\n", title);
             if (parent) out += fmt::format("{}{}.\n\n", parent->doc, parent->need == Need::Required ? "; needed" : "");

@@ -65,6 +65,7 @@ public:
         else emit(path, toml_string(s));
     }
     void integer(const std::string& path, int n, const KeyInfo&) { emit(path, std::to_string(n)); }
+    void integer(const std::string& path, const std::optional<int>& n, const KeyInfo& k) { n ? integer(path, *n, k) : absent(path); }
     void flag(const std::string& path, bool on, const KeyInfo&)
     {
         if (on || purpose_ == Purpose::File) emit(path, on ? "true" : "false");
@@ -76,6 +77,7 @@ public:
         if (k.optional && x == 0) absent(path);
         else emit(path, purpose_ == Purpose::Hash ? digits(x) : toml_degrees(x));
     }
+    void angle(const std::string& path, const std::optional<double>& x, const KeyInfo& k) { x ? angle(path, *x, k) : absent(path); }
     void vector(const std::string& path, const Vector& v, const KeyInfo&)
     {
         emit(path, fmt::format("[{}, {}, {}]", digits(v.x), digits(v.y), digits(v.z)));
@@ -97,13 +99,18 @@ public:
         for (const auto& name : names) texts.push_back(toml_string(name));
         emit(path, texts.size() == 1 ? texts[0] : fmt::format("[{}]", fmt::join(texts, ", ")));
     }
+    void some_names(const std::string& path, const std::vector<std::string>& names, const KeyInfo& k)
+    {
+        names.empty() ? absent(path) : files(path, names, k);
+    }
     void window(const std::string& path, const std::optional<std::array<double, 4>>& w, const KeyInfo&)
     {
         if (w) emit(path, fmt::format("[{}, {}, {}, {}]", digits((*w)[0]), digits((*w)[1]), digits((*w)[2]), digits((*w)[3])));
         else absent(path);
     }
-    void points(const std::string& path, const std::vector<std::array<double, 2>>& ps, const KeyInfo&)
+    void points(const std::string& path, const std::vector<std::array<double, 2>>& ps, const KeyInfo& k)
     {
+        if (k.optional && ps.empty()) return absent(path);
         std::vector<std::string> texts;
         for (const auto& p : ps) texts.push_back(fmt::format("[{}, {}]", digits(p[0]), digits(p[1])));
         emit(path, fmt::format("[{}]", fmt::join(texts, ", ")));
@@ -124,6 +131,11 @@ public:
         const auto found = std::find_if(words.begin(), words.end(), [&](const auto& w) { return w.value == value; });
         ensure(found != words.end(), "a choice without a word");
         emit(path, toml_string(found->word));
+    }
+    template <class Enum>
+    void choice(const std::string& path, std::optional<Enum> value, const std::type_identity_t<Words<Enum>>& words, const KeyInfo& k)
+    {
+        value ? choice(path, *value, words, k) : absent(path);
     }
     template <class Enum, class Describe>
     void choice_or_table(const std::string& path, Enum value, const std::type_identity_t<Words<Enum>>& words, Enum table, const KeyInfo& k,
@@ -166,6 +178,16 @@ public:
             describe(path + "." + (purpose_ == Purpose::Hash ? std::to_string(k) : soils[k].name), soils[k]);
         }
     }
+    template <class Describe>
+    void soil_changes(const std::string& path, std::vector<scene::SoilChange>& changes, const std::vector<scene::Soil>& soils,
+                      const KeyInfo&, Describe describe)
+    {
+        for (auto& c : changes) {
+            const auto& name = soils.at(std::size_t(c.soil)).name;
+            header("[event.soil." + name + "]");
+            describe(path + "." + (purpose_ == Purpose::Hash ? std::to_string(c.soil) : name), c);
+        }
+    }
     void soil_of(const std::string& path, int soil, const std::vector<scene::Soil>& soils, const KeyInfo&)
     {
         emit(path, purpose_ == Purpose::Hash ? std::to_string(soil) : toml_string(soils.at(std::size_t(soil)).name));
@@ -199,6 +221,7 @@ private:
     void absent(const std::string& path)
     {
         if (inline_ || purpose_ == Purpose::Hash) return;
+        if (path.starts_with("event.") || path.starts_with("probe.")) return; // most of what they could say is absent
         const Key& key = *scene_keys().find(path);
         out += fmt::format("# no {}: {}\n", key.leaf(), key.doc);
     }
@@ -232,6 +255,15 @@ void write_ground(const Scene& scene, std::string& out)
     }
 }
 
+/// What files of ground motion have given.
+void write_motions(const Scene& scene, std::string& out)
+{
+    for (std::size_t k = 0; k < scene.events.size(); ++k)
+        if (const auto& rows = scene.events[k].shaking.rows)
+            for (const auto& r : *rows)
+                out += fmt::format("event.{}.shaking = [{}, {}, {}, {}]\n", k, r[0], r[1] + 0.0, r[2] + 0.0, r[3] + 0.0);
+}
+
 std::string written(const Scene& scene, Purpose purpose)
 {
     Writer writer(purpose);
@@ -239,7 +271,7 @@ std::string written(const Scene& scene, Purpose purpose)
     // The ground is said by [terrain].
     std::erase_if(copy.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
     describe(writer, copy);
-    if (purpose == Purpose::Hash) write_ground(scene, writer.out);
+    if (purpose == Purpose::Hash) write_ground(scene, writer.out), write_motions(scene, writer.out);
     return writer.out;
 }
 

@@ -50,6 +50,9 @@ inline constexpr struct WallPressure : Field<"wall_pressure", "m/s^2", Shape::Sc
 } wall_pressure;
 inline constexpr struct WallFriction : Field<"wall_friction", "m/s^2", Shape::Scalar> {
 } wall_friction;
+// Only where forces on walls are told: acceleration by all walls together.
+inline constexpr struct WallForce : Field<"wall_force", "m/s^2", Shape::Vector> {
+} wall_force;
 // State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
 } half_velocity;
@@ -74,9 +77,9 @@ inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::in
 /// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
 enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
-using AllFields =
-    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
-               field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction, field::HalfVelocity,
-               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
+                             field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction,
+                             field::WallForce, field::HalfVelocity, field::HalfDensity, field::HalfStress, field::SortedPosition,
+                             field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

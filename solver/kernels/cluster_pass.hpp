@@ -95,6 +95,7 @@ KUZURE_INLINE Elastoplastic<U> cone_of_now(const Elastoplastic<U>& law, std::spa
 template <class M, class V> class ClusterPass : public PairModel {
 public:
     int cluster_width() const override { return W; }
+    void renew(const scene::Interactions& s) override { model_ = M::from(s, unit_), water_ = PoreWater::from(s.effects); }
     scene::Precision precision() const override { return single<V> ? scene::Precision::Mixed : scene::Precision::Double; }
 
 protected:

@@ -171,6 +171,7 @@ private:
         if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
         if (walled) wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho);
         else forget_contact(p, lanes);
+        if (p.has(field::wall_force)) tell_of_walls(p, lanes, wall, walled);
         const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
         Vec3<U> a = ((stress + viscous) + (artificial + wall)) + body;
         // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)
@@ -184,6 +185,16 @@ private:
         if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) Below::detect_calm(in, lanes, a, v, awake);
 
         report(in, lanes, Moved{x, u, v, a}, Forces{viscous, artificial, wall}, U(volume_) * soil.rho0, walled, tally);
+    }
+    /// All that walls do to each lane; of viscosity the strain stage has left it.
+    static void tell_of_walls(Particles& p, const Lanes& lanes, Vec3<U> wall, bool walled)
+    {
+        const auto told = p[field::wall_force];
+        const Vec3<U> before = told.template load<U>(lanes.at);
+        Vec3<U> all = wall;
+        if constexpr (M::viscous)
+            if (walled) all = before + wall;
+        told.store(lanes.at, select(written<U>(lanes), all, before), lanes.n);
     }
     struct Moved { // after the step: place, velocity half a step before, velocity, acceleration
         Vec3<U> x, u, v, a;

@@ -87,6 +87,9 @@ public:
     virtual void pack(int stage, Index owned, Vector shift, std::byte* to) const = 0;
     virtual void unpack(int stage, Index slot, const std::byte* from) = 0;
 
+    /// The strengths of effects are those of this scene from now on; which there are stays as it was.
+    virtual void renew(const scene::Interactions&) = 0;
+
     /// Bytes of its arrays.
     virtual std::size_t bytes() const = 0;
 };

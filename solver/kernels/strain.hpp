@@ -146,6 +146,12 @@ private:
         widen<V>(sums, out);
     }
 
+    /// What walls do to viscosity waits for the force stage.
+    static void keep_of_walls(Particles& p, const Lanes& lanes, Vec3<U> force)
+    {
+        const auto kept = p[field::wall_force];
+        kept.store(lanes.at, select(written<U>(lanes), force, kept.template load<U>(lanes.at)), lanes.n);
+    }
     struct Strained {
         Sym3<U> sigma;
         U rho, plastic_strain;
@@ -177,8 +183,10 @@ private:
             feels_wall = select(less(zero, abs(w.walled)), one, zero);
             U rubbing = zero;
             if constexpr (M::viscous) {
-                viscous = viscous - (per_rho * volume) * w.viscous;
+                const Vec3<U> by_walls = (per_rho * volume) * w.viscous;
+                viscous = viscous - by_walls;
                 rubbing = -(per_rho * volume) * w.rubbing;
+                if (p.has(field::wall_force)) keep_of_walls(p, lanes, U(-1.0) * by_walls);
             }
             friction_lags(in, lanes, rubbing, soil.c);
         }

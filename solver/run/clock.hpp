@@ -2,7 +2,8 @@
 // Where a run stands in time, and how long its next step is. Decided from numbers that all ranks share.
 #include "solver/pairs/tally.hpp"
 #include "solver/run/energy.hpp"
-#include "solver/scene/scene.hpp"
+#include "solver/scene/events.hpp"
+#include <vector>
 
 namespace kuzure {
 
@@ -26,6 +27,10 @@ struct Clock {
     double largest_energy = 0;  // J, that the guard has met: kinetic + elastic + potential drop, and the kinetic energy at the start
     EnergySums largest_taken{}; // J, the most that each has taken
     std::int64_t inspected = 0; // step of the guard's last inspection
+    int events = 0;             // that have begun, in their order (scene::order_of_events)
+    std::int64_t taken = 0;     // energy units that events have taken out of the ledger; the same on every rank
+    // Impulse on each named wall, in units of an impulse (WallForces); over ranks, kept by rank 0.
+    std::vector<std::array<std::int64_t, 3>> impulse;
 };
 
 /// Length of a step that starts at clock.time, s, 0 when the end time is reached:
@@ -33,5 +38,8 @@ struct Clock {
 double step_length(const Scene&, const Clock&);
 /// Where a step of this length ends, s.
 double time_after(const Scene&, const Clock&, double dt);
+/// How many events have begun at clock.time. Steps are shortened to end where events begin and end; with a fixed step an event happens at
+/// the boundary of two steps that is nearest to its time.
+int events_begun(const Scene&, const Clock&);
 
 } // namespace kuzure

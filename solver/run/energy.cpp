@@ -68,7 +68,7 @@ DissipatedUnits over_ranks(const Team& team, DissipatedUnits mine)
 
 double Ledger::sum() const
 {
-    double all = state.kinetic + state.potential + state.elastic;
+    double all = state.kinetic + state.potential + state.elastic + events;
     for_each_member(dissipated, dissipated, [&](double e, double) { all += e; });
     return all;
 }
@@ -92,8 +92,8 @@ std::string state_hash(const Team& team, const Particles& p)
     p.for_each_present([&](auto f) {
         using F = decltype(f);
         const auto is = [](auto... g) { return (std::is_same_v<F, std::remove_const_t<decltype(g)>> || ...); };
-        // not what never changes: where it began, id and soil
-        if constexpr (!is(field::origin, field::id, field::soil)) {
+        // not what never changes: where it began, id and soil; nor what walls did, which no step needs
+        if constexpr (!is(field::origin, field::id, field::soil, field::wall_force)) {
             const auto columns = p[f];
             for (const auto* c : columns.column)
                 for (Index i = 0; i < n; ++i) {

@@ -43,6 +43,7 @@ DissipatedUnits over_ranks(const Team&, DissipatedUnits);
 struct Ledger {
     StateEnergy state;
     EnergySums dissipated;
+    double events = 0; // J, that events have taken
     double sum() const;
 };
 

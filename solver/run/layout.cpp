@@ -122,11 +122,13 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
             for (int c = -pz; c <= pz; ++c) {
                 const Vector shift{a * step.x, b * step.y, c * step.z};
                 filling_.for_each_wall_in({wall_region_->low - shift, wall_region_->high - shift}, [&](std::int64_t id, Vector at, int w) {
+                    if (!scene_.walls[std::size_t(w)].present) return;
                     walls_[w].x.push_back(at.x + shift.x), walls_[w].y.push_back(at.y + shift.y), walls_[w].z.push_back(at.z + shift.z);
                     walls_[w].id.push_back(id);
                 });
             }
     for (auto& w : walls_) w.sort(columns_);
+    ++wall_renewals_;
     model.set_walls(scene_, walls_);
 }
 

@@ -17,6 +17,8 @@ public:
 
     /// True where a particle may have moved further since the last sort than the lists allow (squared displacement, m^2).
     bool outgrown(double displacement2) const;
+    /// Other walls or particles: nothing of what was built holds any more, nor that particles are those of the lists.
+    void forget() { built_ = false, wall_region_.reset(); }
     /// Positions and origins of what left a period are taken back into it.
     void wrap_into_period(Particles&) const;
     /// The present positions are where particles are sorted from now on.
@@ -39,6 +41,8 @@ public:
     /// Where owned particles and ghosts were sorted, by record, m.
     Vector sorted(const Particles&, Index record) const;
     const std::vector<WallPoints>& walls() const { return walls_; }
+    /// How often those were made anew.
+    std::int64_t wall_renewals() const { return wall_renewals_; }
     /// How far lists and ghosts reach, m.
     double reach() const { return reach_; }
     bool built() const { return built_; }
@@ -60,6 +64,7 @@ private:
     ClusterLists lists_;
     std::vector<WallPoints> walls_;
     std::optional<scene::Box> wall_region_;
+    std::int64_t wall_renewals_ = 0;
     // How far beyond the support the pruned lists reach, and an upper bound of any particle's displacement since they were made, m.
     double pruned_margin_ = 0, pruned_way_ = 0;
     bool built_ = false;

@@ -16,6 +16,8 @@ Scene settling_scene(const Scene& scene, double end, bool held)
 {
     Scene s = scene;
     std::erase_if(s.bodies, [](const scene::Body& b) { return !scene::rests(b); });
+    std::erase_if(s.walls, [](const scene::Wall& w) { return !w.present; });
+    s.events.clear(), s.probes.clear();
     for (auto& b : s.bodies) b.velocity = {};
     for (auto& soil : s.soils) {
         soil.softening.reset(), soil.dilation_decay.reset(), soil.rate_friction.reset();

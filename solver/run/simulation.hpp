@@ -7,6 +7,7 @@
 #include "solver/run/clock.hpp"
 #include "solver/run/layout.hpp"
 #include "solver/run/settle.hpp"
+#include "solver/run/wall_forces.hpp"
 #include "solver/run/watch.hpp"
 
 namespace kuzure {
@@ -33,6 +34,14 @@ struct Requests {
     bool stop = false, checkpoint = false;
 };
 
+/// An event that has begun.
+struct Happened {
+    int event;   // number in Scene::events
+    double time; // s
+    std::int64_t step;
+    double taken; // J, that it took out of the ledger at once, together with others of that time
+};
+
 class Simulation {
 public:
     /// Fills the scene (with effects resolved). Collective. Throws BadInput.
@@ -56,7 +65,12 @@ public:
     const std::optional<Settling>& settled() const { return settled_; }
     const Particles& particles() const { return particles_; }
     const scene::Filling& filling() const { return filling_; }
+    /// As it is now: events change it.
     const Scene& scene() const { return scene_; }
+    /// Those that have begun since this start of the program, in their order.
+    std::span<const Happened> happened() const { return happened_; }
+    /// Collective: force, moment and impulse on the walls that have names.
+    std::vector<WallLoad> wall_loads() { return wall_forces_.loads(comm_, particles_, clock_); }
     std::span<const Material> soils() const { return soils_; }
     const PairModel& model() const { return *model_; }
     const Comm& comm() const { return comm_; }
@@ -99,8 +113,21 @@ private:
     void start_soil();
     void rebuild(bool sort_anew, double way = 0);
     StepInput step_input(double dt, double next);
-    /// The forces of the start, where steps need them first. Collective.
-    void evaluate_start();
+    /// The forces of a state that no step led to, where steps need them first. Collective.
+    void evaluate_anew();
+    /// The events that are due at the present time. Collective.
+    void begin_events();
+    /// The scene, and what is made of it, as events have it at a time, s.
+    void enter_stage(double time);
+    /// Takes the soil of bodies away that went, and puts that of those there that came. Collective.
+    void change_bodies(const Scene& before);
+    /// Throws NumbersFailed where a wall or body came to stand in soil. Collective.
+    void require_room(const Scene& before);
+    /// What changes little by little takes its values of the end of a step; gives the scene before, where something does. Collective.
+    std::optional<Scene> follow_courses(double dt);
+    void end_course(const Scene& before);
+    StateEnergy state(const Scene&, double dt) const;
+    void take(double joules);
     PassResult run_stages(const StepInput&);
     Requests reduce(const PassResult&, Requests mine);
     /// How fast the whole scene flies past at a time (s): without walls the mean velocity of its bodies, falling with gravity.
@@ -118,7 +145,8 @@ private:
     void remember();
 
     const Comm& comm_;
-    Scene scene_;
+    Scene start_scene_; // as it is before its events
+    Scene scene_;       // as it is now
     RunOptions options_;
     scene::Filling filling_;
     std::vector<Material> soils_;
@@ -127,6 +155,9 @@ private:
     Layout layout_;
     Balance balance_;
     Watch watch_;
+    WallForces wall_forces_;
+    std::vector<Happened> happened_;
+    int events_before_ = 0; // that had begun before this start of the program
     Particles particles_;
     std::optional<Settling> settled_;
     PoreWater water_;

@@ -1,6 +1,7 @@
 #include "solver/run/start.hpp"
 #include "solver/run/blocks.hpp"
 #include "solver/run/initial_stress.hpp"
+#include "solver/scene/events.hpp"
 #include "solver/scene/shape.hpp"
 
 namespace kuzure {
@@ -38,12 +39,12 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
         if (domain.owners()[k] != comm.rank()) continue;
         const Block b = domain.blocks()[k];
         filling.for_each_soil_in(box_of(domain.space(), b, 1e-6 * scene.space.spacing), [&](std::int64_t id, Vector x, int body) {
-            if (domain.block_of(x) == b) start.push_back({id, x, body});
+            if (scene.bodies[std::size_t(body)].present && domain.block_of(x) == b) start.push_back({id, x, body});
         });
     }
     domain.keep_neighbourhood();
     p.resize(Index(start.size()));
-    ensure(comm.sum(std::int64_t(start.size())) == filling.soil_count(), "the ranks together do not hold the scene's soil");
+    ensure(comm.sum(std::int64_t(start.size())) == scene::soil_present(scene, filling), "the ranks together do not hold the scene's soil");
     const InitialStress at_rest(scene, filling, soils);
     const Index n = p.size();
 #pragma omp parallel for schedule(static)
@@ -54,12 +55,13 @@ void fill_start(const Comm& comm, Domain& domain, const Scene& scene, const scen
     }
 }
 
-void add_restless(const Comm& comm, const Scene& scene, const scene::Filling& filling, std::span<const Material> soils, Particles& p)
+void add_bodies(const Comm& comm, const Scene& scene, const scene::Filling& filling, std::span<const Material> soils, Particles& p,
+                const std::function<bool(const scene::Body&)>& wanted)
 {
     std::int64_t first = 0;
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const std::int64_t n = filling.body_count(int(b)), r = comm.rank(), ranks = comm.size();
-        if (!scene::rests(scene.bodies[b])) {
+        if (wanted(scene.bodies[b])) {
             const std::int64_t begin = first + n * r / ranks, end = first + n * (r + 1) / ranks;
             const Index at = p.size();
             p.resize(at + Index(end - begin));
@@ -79,7 +81,9 @@ double energy_scale(const Scene& scene, const scene::Filling& filling, std::span
         b.low = {std::min(b.low.x, w.low.x), b.low.y, std::min(b.low.z, w.low.z)};
         b.high = {std::max(b.high.x, w.high.x), b.high.y, std::max(b.high.z, w.high.z)};
     }
-    const double g = length(scene.effects.gravity.value_or(Vector{}));
+    double g = length(scene.effects.gravity.value_or(Vector{}));
+    for (const auto& e : scene.events)
+        if (e.gravity) g = std::max(g, length(*e.gravity));
     double scale = 0;
     for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
         const auto& body = scene.bodies[k];

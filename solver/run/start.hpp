@@ -4,6 +4,7 @@
 #include "solver/scene/fill.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/scene.hpp"
+#include <functional>
 
 namespace kuzure {
 
@@ -13,8 +14,9 @@ void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::
 /// Velocity with which a body starts, m/s; none along y in 2-D.
 Vector start_velocity(const Scene&, const scene::Body&);
 
-/// Adds this rank's even share of the bodies that are not "at rest" to soil that is there already.
-void add_restless(const Comm&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
+/// Adds this rank's even share of some bodies to soil that is there already, as they start, without stress.
+void add_bodies(const Comm&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&,
+                const std::function<bool(const scene::Body&)>& wanted);
 
 /// Energy scale of a whole run, J: weight times height, or kinetic energy, or a little strain.
 double energy_scale(const Scene&, const scene::Filling&, std::span<const Material>);

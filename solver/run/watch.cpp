@@ -1,6 +1,7 @@
 #include "solver/run/watch.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/events.hpp"
 #include "solver/scene/height_field.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
@@ -121,8 +122,9 @@ void Watch::fail_at(const Particles& p, const Clock& clock, std::int64_t id, con
     for (Index i = 0; i < p.size(); ++i) {
         if (p[field::id][i] != id) continue;
         const Vector x = p[field::position][i], v = p[field::velocity][i];
-        text = fmt::format("particle {} (body {}) {} at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. Remedy: {}",
-                           id, filling_.body_of(id), what, x.x, x.y, x.z, length(v), clock.step, clock.time, remedy);
+        text =
+            fmt::format("particle {} ({}) {} at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} m/s in step {}, t = {:.6g} s. Remedy: {}", id,
+                        scene::name_of_body(scene_, filling_.body_of(id)), what, x.x, x.y, x.z, length(v), clock.step, clock.time, remedy);
         root = comm_.rank();
     }
     root = int(comm_.max(std::int64_t(root)));
@@ -189,10 +191,12 @@ std::string Watch::nearest_wall(const Particles& p, std::int64_t id) const
     for (Index i = 0; i < p.size(); ++i) {
         if (p[field::id][i] != id) continue;
         for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-            if (const double d = scene::signed_distance(scene_.walls[w].shape, p[field::position][i], scene_.dimensions); d < nearest)
+            if (!scene_.walls[w].present) continue;
+            else if (const double d = scene::signed_distance(scene_.walls[w].shape, p[field::position][i], scene_.dimensions); d < nearest)
                 nearest = d, wall = std::int64_t(w);
     }
-    return fmt::format("wall {}", comm_.max(wall));
+    const std::int64_t found = comm_.max(wall);
+    return found < 0 ? "no wall" : scene::name_of_wall(scene_, int(found));
 }
 
 void Watch::inspect(const Particles& p, const Layout& layout, Clock& clock, const Ledger& l)

@@ -15,6 +15,7 @@ inline constexpr double energy_growth = 0.10; // of the largest energy in the le
 inline constexpr double given = 1e-3;         // of the largest energy met: what fixed walls may have given, and dissipations lost again
 inline constexpr double neighbours = 3.0;     // times those of the lattice
 inline constexpr double penetration = 1.0;    // spacings that a particle may sink into a wall
+inline constexpr double in_new_piece = 0.5;   // spacings that soil may lie inside a wall or body that an event adds
 inline constexpr double density = 10.0;       // times or parts of that at the start
 inline constexpr double near = 0.6;           // spacings below which two particles count as clumped
 } // namespace limit

@@ -29,7 +29,7 @@ double gap_to_a_wall(const Scene& scene, Vector x, int body, Vector direction)
         const Vector at = x + t * direction;
         if (holds(own, at, scene.dimensions, tolerance)) end = t;
         for (const Wall& w : scene.walls)
-            if (holds(w.shape, at, scene.dimensions, tolerance)) return t - end > 2.5 * step ? t - end : 0;
+            if (w.present && holds(w.shape, at, scene.dimensions, tolerance)) return t - end > 2.5 * step ? t - end : 0;
     }
     return 0;
 }
@@ -85,6 +85,7 @@ Columns::Above Columns::above(Vector x, int body) const
         const Vector at = x + shift;
         const Box region{{at.x - reach, at.y - reach, x.z - (0.5 - nothing_) * dx}, {at.x + reach, at.y + reach, top + dx}};
         filling_.for_each_soil_stack_in(region, [&](const Stack& s, int b) {
+            if (!scene_.bodies[std::size_t(b)].present) return;
             const double part = share(s.x - at.x) * (scene_.dimensions == 2 ? 1 : share(s.y - at.y));
             if (b == body && part == 1 && s.foot < x.z && s.top > x.z) own.top = s.top;
             else if (part > nothing_) others.push_back({b, s.foot, s.top, part});
@@ -138,6 +139,7 @@ struct Bystander {
         std::string why;
         const auto compare = [&](Vector shift) {
             filling.for_each_soil_stack_in({from + shift, to + shift}, [&](const Stack& n, int other) {
+                if (!scene.bodies[std::size_t(other)].present) return;
                 const double there = columns.above({n.x, n.y, n.foot + 0.5 * dx()}, other).surface;
                 if (why.empty() && std::abs(there - surface) > 0.75 * dx())
                     why =

@@ -1,6 +1,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/core/field.hpp"
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/events.hpp"
 #include "solver/scene/map_grid.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/nearby.hpp"
@@ -61,6 +62,10 @@ std::string no_static_part(const Scene& scene)
 {
     const auto& g = scene.effects.gravity;
     if (g && (g->x != 0 || g->y != 0)) return "gravity is not vertical, so the ground is not level";
+    for (const auto& e : scene.events) {
+        if (e.gravity || !e.shaking.file.empty()) return "gravity changes while the run goes on";
+        if (!e.add.empty() || !e.remove.empty()) return "walls or bodies come or go, so the ground may not stay level";
+    }
     if (scene.soils.size() > 1) return "there are several soils, between which stress jumps";
     for (const auto& body : scene.bodies)
         if (!std::holds_alternative<Box>(body.shape) && !std::holds_alternative<Cylinder>(body.shape))
@@ -405,6 +410,27 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
                       "nothing will sleep: in steps this long a P-wave crosses half a support; 0, or a smaller step");
 }
 
+/// The soils, effects and steps of every stage obey the rules of a start.
+void check_stages(const Scene& scene, StepLimit limit, Rules& rules)
+{
+    const auto order = order_of_events(scene);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        const Event& e = scene.events[std::size_t(order[k])];
+        const Scene stage = stage_of(scene, int(k) + 1, end_of(e));
+        Rules then;
+        check_soils(stage, then);
+        check_effects(stage, then);
+        check_time(stage, limit, then);
+        for (const auto& issue : then.issues)
+            if (issue.severity == Severity::Error)
+                rules.error(text("event.{}", order[k]),
+                            text("{} ({}): {}: {}", time_in_words(e), in_words(scene, e), issue.key, issue.text));
+    }
+    if (!scene.events.empty() && scene.accuracy.scheme == Scheme::LeapFrog &&
+        std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); }))
+        rules.warning("wall", "the leap-frog scheme does not tell the force on each wall: there will be no forces.csv");
+}
+
 void check_inside(const Scene& scene, Rules& rules)
 {
     const Space& space = scene.space;
@@ -512,6 +538,7 @@ void resolve(Scene& scene)
         if (maps->cell == 0) maps->cell = 2 * scene.space.spacing;
         if (maps->wet == 0) maps->wet = scene.space.spacing;
     }
+    resolve_presence(scene);
     auto& notes = scene.notes;
     notes.clear();
     const auto note = [&](const char* name, bool on, std::string why) { notes.push_back({name, std::move(why), on}); };
@@ -528,6 +555,9 @@ void resolve(Scene& scene)
     std::string tension;
     for (const auto& soil : scene.soils)
         if (tension.empty()) tension = tension_in(soil);
+    for (std::size_t k = 1; k <= scene.events.size() && tension.empty(); ++k)
+        for (const auto& soil : stage_of(scene, int(k), std::numeric_limits<double>::infinity()).soils)
+            if (tension.empty() && !tension_in(soil).empty()) tension = "after an event " + tension_in(soil);
     const bool automatic = effects.artificial_stress_decision == Decision::Auto;
     if (automatic) {
         effects.artificial_stress.reset();
@@ -588,6 +618,11 @@ void resolve(Scene& scene)
          weak.empty() ? unwritten : text("{}: residual strength after a slip, bands taken {:.4g} m wide", weak, scene.support()));
     const auto fast = list_soils([](const Soil& s) { return s.rate_friction.has_value(); });
     note("rate_friction", !fast.empty(), fast.empty() ? unwritten : "mu(I) in " + fast);
+
+    for (const int k : order_of_events(scene)) {
+        const Event& e = scene.events[std::size_t(k)];
+        note("event", true, text("{}: {}", time_in_words(e), in_words(scene, e)));
+    }
 
     const auto resting = std::count_if(scene.bodies.begin(), scene.bodies.end(), rests);
     note("stress_at_rest", resting > 0,
@@ -676,12 +711,15 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
 {
     Rules rules;
     check_space(scene, rules);
+    check_names_and_events(scene, rules.issues);
     check_soils(scene, rules);
     check_bodies(scene, rules);
     check_effects(scene, rules);
     check_time(scene, limit, rules);
     check_plausible(scene, rules);
     check_inside(scene, rules);
+    if (std::none_of(rules.issues.begin(), rules.issues.end(), [](const Issue& i) { return i.severity == Severity::Error; }))
+        check_stages(scene, limit, rules);
     if (scene.maps && scene.dimensions == 2)
         rules.error("maps",
                     "expected dimensions = 3 with [maps], which are drawn in plan, found 2; use dimensions = 3 or leave [maps] out");
@@ -697,6 +735,10 @@ std::optional<CheckedScene> check_and_fill(Scene scene, StepLimit limit, Issues&
         check_maps(scene, *filling, rules);
         for (auto& n : dimensionless_numbers(scene, *filling))
             if (!n.warning.empty()) rules.warning(n.name, n.warning);
+        for (std::size_t k = 0; k < scene.probes.size(); ++k)
+            if (const auto& p = scene.probes[k].particle; p && *p >= filling->soil_count())
+                rules.error(text("probe.{}.particle", k),
+                            text("expected a particle of soil, an id from 0 to {}, found {}", filling->soil_count() - 1, *p));
         for (std::size_t b = 0; b < scene.bodies.size(); ++b)
             if (const double excess = excess_of_mass(scene, *filling, int(b)); std::abs(excess) > most_excess + 1e-9)
                 rules.warning(text("body.{}.{}", b, name_of(scene.bodies[b].shape)),
@@ -738,6 +780,7 @@ double column_bytes(const Scene& scene, const Filling& filling)
         if (is(field::acceleration)) return !leap_frog;
         if (is(field::stress_rate)) return !leap_frog && scene.effects.stress_diffusion.has_value();
         if (is(field::wall_slip, field::wall_pressure, field::wall_friction)) return !leap_frog && coulomb;
+        if (is(field::wall_force)) return !leap_frog && std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); });
         if (is(field::opened_volume)) return remembers;
         if (is(field::activity)) return scene.accuracy.sleep_below > 0;
         return true;

@@ -1,5 +1,6 @@
 #include "solver/scene/fill.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/scene/events.hpp"
 #include "solver/scene/nearby.hpp"
 #include <fmt/format.h>
 
@@ -404,15 +405,22 @@ Filling::Survey Filling::survey(const Scene& scene)
     struct Piece {
         std::string name, key;
         const Shape* shape;
+        std::vector<std::array<double, 2>> times; // s, from which and to which it is there
         std::string problem;
         std::optional<Points> points;
     };
     std::vector<Piece> pieces;
-    const auto add = [&](const std::string& name, const Shape& shape) {
-        pieces.push_back({name, name + "." + name_of(shape), &shape, {}, {}});
+    const auto add = [&](const std::string& key, const auto& part) {
+        pieces.push_back({key, key + "." + name_of(part.shape), &part.shape, presence(scene, part.name), {}, {}});
     };
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) add(fmt::format("body.{}", b), scene.bodies[b].shape);
-    for (std::size_t w = 0; w < scene.walls.size(); ++w) add(fmt::format("wall.{}", w), scene.walls[w].shape);
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) add(fmt::format("body.{}", b), scene.bodies[b]);
+    for (std::size_t w = 0; w < scene.walls.size(); ++w) add(fmt::format("wall.{}", w), scene.walls[w]);
+    const auto ever_together = [](const Piece& a, const Piece& b) {
+        for (const auto& s : a.times)
+            for (const auto& t : b.times)
+                if (s[0] < t[1] && t[0] < s[1]) return true;
+        return false;
+    };
 
     Issues issues;
     const int dimensions = scene.dimensions;
@@ -465,7 +473,7 @@ Filling::Survey Filling::survey(const Scene& scene)
     for (std::size_t i = 0; i < pieces.size() && issues.size() < enough; ++i)
         for (const std::size_t j : near.meeting(boxes[i])) {
             const auto &a = pieces[i], &b = pieces[j];
-            if (j <= i || issues.size() >= enough || !a.points || !b.points) continue;
+            if (j <= i || issues.size() >= enough || !a.points || !b.points || !ever_together(a, b)) continue;
             const double depth = common(boxes[i], boxes[j], dimensions);
             if (depth <= std::max(slack(*a.shape, scene.space.spacing, dimensions), slack(*b.shape, scene.space.spacing, dimensions)))
                 continue;

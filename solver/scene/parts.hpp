@@ -108,6 +108,8 @@ struct Body {
     Shape shape;
     Vector velocity{}; // m/s
     InitialStress stress = InitialStress::None;
+    std::string name = {}; // empty: none
+    bool present = true;   // false before the event that adds it and after the one that removes it
     bool operator==(const Body&) const = default;
 };
 
@@ -116,6 +118,8 @@ struct Wall {
     Shape shape;
     Surface surface = Surface::Rough;
     double friction_angle = 0; // rad, for Coulomb
+    std::string name = {};     // empty: none
+    bool present = true;       // as of a body
     bool operator==(const Wall&) const = default;
 };
 

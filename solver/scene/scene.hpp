@@ -73,6 +73,43 @@ struct Terrain {
     GroundLattice lattice = GroundLattice::Draped;
     bool operator==(const Terrain&) const = default;
 };
+// ---- stages ----
+/// What an event makes of a soil; what is absent stays as it was.
+struct SoilChange {
+    int soil = 0;                                         // index into Scene::soils; -1: there is none of that name
+    std::optional<double> young, poisson, cohesion;       // Pa, 1, Pa
+    std::optional<double> friction_angle, dilation_angle; // rad
+    std::optional<double> tension_cutoff;                 // Pa
+    std::optional<Cone> cone;
+    std::optional<double> strength, stiffness; // factors of c, tan(phi) and the cut-off; of Young's modulus
+    bool operator==(const SoilChange&) const = default;
+};
+/// Acceleration of the ground over time, read from a file: rows of s and m/s^2 (x, y, z).
+struct GroundMotion {
+    std::string file; // an absolute path
+    std::shared_ptr<const std::vector<std::array<double, 4>>> rows;
+    bool operator==(const GroundMotion&) const; // by its rows
+};
+/// A change of the scene while it runs: at one time, or linearly from one to another. What is absent stays as it was.
+struct Event {
+    std::optional<double> at, from, to;       // s; at alone, or from and to
+    std::vector<std::string> add, remove;     // names of walls and bodies
+    std::optional<Vector> gravity;            // m/s^2
+    GroundMotion shaking;                     // no rows: none
+    std::vector<std::array<double, 2>> water; // x, z in m, the new water table; empty: as it was
+    std::optional<double> damping;            // of critical, 1; 0: none
+    std::vector<SoilChange> soils;
+    bool operator==(const Event&) const = default;
+};
+/// A row a time in probes.csv: of a place, of one particle or of the mean of a body.
+struct Probe {
+    std::string name;            // empty: its number
+    std::optional<Vector> point; // m
+    std::optional<int> particle; // id
+    std::string body;
+    bool operator==(const Probe&) const = default;
+};
+
 /// Where the scene's coordinates lie on the map.
 struct MapFrame {
     std::string crs;     // as WKT; empty: nowhere
@@ -103,6 +140,8 @@ struct Scene {
     std::optional<scene::Terrain> terrain;
     scene::MapFrame map_frame; // of the terrain
     std::optional<scene::Maps> maps;
+    std::vector<scene::Event> events;
+    std::vector<scene::Probe> probes;
     scene::Start start;
     scene::Effects effects;
     scene::Accuracy accuracy;

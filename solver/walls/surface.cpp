@@ -78,6 +78,7 @@ WallSurface::WallSurface(const Scene& scene) : scene_(scene), dimensions_(scene.
     const Vector period = s.low ? *s.high - *s.low : Vector{};
     const int px = s.periodic[0], py = s.periodic[1], pz = s.periodic[2];
     for (int w = 0; w < int(scene.walls.size()); ++w) {
+        if (!scene.walls[w].present) continue;
         auto b = scene::bounds(scene.walls[w].shape);
         if (dimensions_ == 2) b.low.y = -std::numeric_limits<double>::infinity(), b.high.y = std::numeric_limits<double>::infinity();
         for (int i = -px; i <= px; ++i)

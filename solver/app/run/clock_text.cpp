@@ -34,6 +34,9 @@ std::string clock_text(const Simulation& sim)
                                   {"base_time", c.base_time},
                                   {"base_step", c.base_step},
                                   {"inspected", c.inspected},
+                                  {"events", c.events},
+                                  {"taken", c.taken},
+                                  {"impulse", c.impulse},
                                   {"frame_way", {c.frame_way.x, c.frame_way.y, c.frame_way.z}},
                                   {"largest_energy", c.largest_energy},
                                   {"largest_taken", {c.largest_taken.plastic, c.largest_taken.viscous, c.largest_taken.damping}},
@@ -59,13 +62,14 @@ Clock clock_from_text(const std::string& header, const io::Place& file)
         j.at("energy_at_start").get_to(c.energy_at_start), j.at("energy_unit").get_to(c.energy_unit);
         j.at("step_scale").get_to(c.step_scale), j.at("base_time").get_to(c.base_time);
         j.at("base_step").get_to(c.base_step), j.at("inspected").get_to(c.inspected);
+        j.at("events").get_to(c.events), j.at("taken").get_to(c.taken), j.at("impulse").get_to(c.impulse);
         const auto& way = j.at("frame_way");
         way.at(0).get_to(c.frame_way.x), way.at(1).get_to(c.frame_way.y), way.at(2).get_to(c.frame_way.z);
         const auto& taken = j.at("largest_taken");
         j.at("largest_energy").get_to(c.largest_energy), taken.at(0).get_to(c.largest_taken.plastic);
         taken.at(1).get_to(c.largest_taken.viscous), taken.at(2).get_to(c.largest_taken.damping);
         // JSON has no infinities; what a run cannot have is left.
-        if (c.time < 0 || c.dt < 0 || c.step < 0 || c.pairs < 0)
+        if (c.time < 0 || c.dt < 0 || c.step < 0 || c.pairs < 0 || c.events < 0)
             throw IoFailed(fmt::format("{}: the clock of this checkpoint is not one that a run can have (t = {:g} s, step {}, dt {:g} s)",
                                        file.string(), c.time, c.step, c.dt));
         return c;

@@ -56,9 +56,16 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     s.seconds_per_step = steps_here > 0 ? stepping / double(steps_here) : 0;
     const std::int64_t particle_steps = comm_.sum(sim.work_done().particle_steps);
     s.particle_steps_per_second = stepping > 0 ? double(particle_steps) / stepping : 0;
-    s.energy = {{"kinetic", l.state.kinetic},      {"potential", l.state.potential},          {"elastic", l.state.elastic},
-                {"plastic", l.dissipated.plastic}, {"viscous", l.dissipated.viscous},         {"wall", l.dissipated.wall},
-                {"damping", l.dissipated.damping}, {"stabilising", l.dissipated.stabilising}, {"moved_wall", 0.0},
+    s.energy = {{"kinetic", l.state.kinetic},
+                {"potential", l.state.potential},
+                {"elastic", l.state.elastic},
+                {"plastic", l.dissipated.plastic},
+                {"viscous", l.dissipated.viscous},
+                {"wall", l.dissipated.wall},
+                {"damping", l.dissipated.damping},
+                {"stabilising", l.dissipated.stabilising},
+                {"moved_wall", 0.0},
+                {"events", l.events},
                 {"residual", sim.residual(l)}};
     s.effects = scene_.notes;
     s.state_hash = state_hash(comm_, sim.particles());

@@ -1,8 +1,10 @@
 #include "solver/app/run/outputs.hpp"
 #include "io/soil_color.hpp"
 #include "solver/core/wall_clock.hpp"
+#include "solver/run/probes.hpp"
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 
 namespace kuzure {
 
@@ -44,6 +46,17 @@ void Outputs::open(std::optional<double> restart)
     snapshots_.emplace(comm_, directory_.snapshots(), restart);
     history_.emplace(comm_, directory_.history(), scene_.dimensions, restart);
     progress_.emplace(comm_, directory_.progress(), restart);
+    if (!scene_.events.empty()) events_.emplace(comm_, directory_ / "events.csv", scene_.dimensions, restart);
+    if (!WallForces::named(scene_).empty()) forces_.emplace(comm_, directory_ / "forces.csv", scene_.dimensions, restart);
+    if (!scene_.probes.empty()) probes_.emplace(comm_, directory_ / "probes.csv", restart);
+}
+
+void Outputs::sync()
+{
+    history_->sync();
+    if (events_) events_->sync();
+    if (forces_) forces_->sync();
+    if (probes_) probes_->sync();
 }
 
 void Outputs::begin_maps(Simulation& sim, std::vector<io::NamedPoint> points, const std::optional<KeptMaps>& kept,
@@ -57,10 +70,30 @@ void Outputs::write_maps(Simulation& sim)
     if (maps_) maps_->write(sim, Maps::Pictures::Draw);
 }
 
-void Outputs::take_back(double time)
+void Outputs::take_back(const Simulation& sim)
 {
-    open(time);
-    if (maps_) maps_->take_back(time);
+    open(sim.time());
+    told_ = std::min(told_, sim.happened().size());
+    if (maps_) maps_->take_back(sim.time());
+}
+
+std::vector<std::string> Outputs::write_events(const Simulation& sim)
+{
+    std::vector<std::string> words;
+    const auto news = sim.happened().subspan(told_);
+    told_ = sim.happened().size();
+    if (news.empty()) return words;
+    std::vector<io::EventRow> rows;
+    for (const auto& h : news) {
+        const auto& event = scene_.events[std::size_t(h.event)];
+        std::string what = scene::in_words(scene_, event);
+        words.push_back(fmt::format("t = {:.6g} s, event {}{}: {}", h.time, h.event,
+                                    scene::lasting(event) ? fmt::format(" (to {:.6g} s)", scene::end_of(event)) : "", what));
+        std::ranges::replace(what, ',', ' '); // a cell
+        rows.push_back({h.time, h.step, h.event, what, h.taken});
+    }
+    if (!events_->last_time() || rows.front().time > *events_->last_time()) events_->append(rows);
+    return words;
 }
 
 void Outputs::begin_loop(const Simulation& sim)
@@ -74,7 +107,12 @@ void Outputs::write_due(Simulation& sim, double before, bool last)
     const double t = sim.time();
     if (before < 0 || last || due(scene_.time.end / 400, t, before)) log_progress(sim);
     if (due(scene_.output.history, t, before) || last || before < 0) {
-        if (!history_->last_time() || t > *history_->last_time()) sim.timers().timed(Phase::History, [&] { write_history(sim); });
+        const auto fresh = [&](const auto& rows) { return rows && (!rows->last_time() || t > *rows->last_time()); };
+        sim.timers().timed(Phase::History, [&] {
+            if (fresh(history_)) write_history(sim);
+            if (fresh(forces_)) write_forces(sim);
+            if (fresh(probes_)) write_probes(sim);
+        });
     }
     if (maps_) {
         if (before >= 0 && t > before) maps_->after_step(sim);
@@ -106,9 +144,41 @@ void Outputs::write_history(Simulation& sim)
     // energy.cpp's sums, and the columns they and the heap read
     const auto n = double(sim.particles().size());
     sim.timers().did(Phase::History, 45 * n, 20 * 8 * n);
-    history_->append({sim.time(), sim.steps(), sim.dt(), l.state.kinetic, l.state.potential, l.state.elastic, l.dissipated.plastic,
-                      l.dissipated.viscous, l.dissipated.wall, l.dissipated.damping, *residual_, sim.max_speed(), fronts.height,
-                      fronts.min_x, fronts.max_x, fronts.min_y, fronts.max_y, l.dissipated.stabilising, 0.0});
+    history_->append({sim.time(),
+                      sim.steps(),
+                      sim.dt(),
+                      l.state.kinetic,
+                      l.state.potential,
+                      l.state.elastic,
+                      l.dissipated.plastic,
+                      l.dissipated.viscous,
+                      l.dissipated.wall,
+                      l.dissipated.damping,
+                      *residual_,
+                      sim.max_speed(),
+                      fronts.height,
+                      fronts.min_x,
+                      fronts.max_x,
+                      fronts.min_y,
+                      fronts.max_y,
+                      l.dissipated.stabilising,
+                      0.0,
+                      l.events});
+}
+
+void Outputs::write_forces(Simulation& sim)
+{
+    std::vector<io::ForceRow> rows;
+    for (const auto& load : sim.wall_loads()) rows.push_back({sim.time(), load.name, load.force, load.moment, load.impulse});
+    forces_->append(rows);
+}
+
+void Outputs::write_probes(const Simulation& sim)
+{
+    std::vector<io::ProbeRow> rows;
+    for (const auto& r : read_probes(comm_, sim.scene(), sim.filling(), sim.soils(), sim.particles()))
+        rows.push_back({sim.time(), r.name, r.particles, r.position, r.velocity, r.density, r.stress, r.plastic_strain});
+    probes_->append(rows);
 }
 
 void Outputs::write_snapshot(const Simulation& sim, std::optional<std::int64_t> failed)

@@ -25,10 +25,12 @@ public:
     void write_maps(Simulation&);
     /// Collective: the state whose numbers failed, unless it is kept already.
     void write_failure(Simulation&);
-    /// Collective: forgets what was written after a time (s), to which the simulation went back.
-    void take_back(double time);
-    /// The history is on the disk as far as it goes.
-    void sync() { history_->sync(); }
+    /// Collective: forgets what was written after the time to which the simulation went back.
+    void take_back(const Simulation&);
+    /// Collective: the events that a step began with are in events.csv; gives them in words.
+    std::vector<std::string> write_events(const Simulation&);
+    /// The history and what else grows with it is on the disk as far as it goes.
+    void sync();
     /// Of the last row of the history; nothing before there is one.
     const std::optional<double>& residual() const { return residual_; }
     const std::optional<Fronts>& fronts() const { return fronts_; }
@@ -37,6 +39,8 @@ public:
 private:
     void open(std::optional<double> restart);
     void write_history(Simulation&);
+    void write_forces(Simulation&);
+    void write_probes(const Simulation&);
     void write_snapshot(const Simulation&, std::optional<std::int64_t> failed);
     void log_progress(const Simulation&);
 
@@ -47,6 +51,10 @@ private:
     std::optional<io::Snapshots> snapshots_;
     std::optional<io::History> history_;
     std::optional<io::ProgressLog> progress_;
+    std::optional<io::EventLog> events_; // of a scene that has some
+    std::optional<io::ForceLog> forces_;
+    std::optional<io::ProbeLog> probes_;
+    std::size_t told_ = 0; // events of Simulation::happened() that are written
     std::optional<double> residual_;
     std::optional<Fronts> fronts_;
     std::optional<Maps> maps_;

@@ -127,7 +127,7 @@ private:
         io::read_checkpoint(comm_, from, p);
         const Clock clock = clock_from_text(from.header, from.file);
         facts_.peak_speed = peak_speed_of(from);
-        require_sound_state(comm_, from, p, scene_, *options.filling);
+        require_sound_state(comm_, from, p, scene_, *options.filling, clock);
         const auto fields = field_names(p);
         checkpoints_->went_on_from(from.file);
         sim_ = std::make_unique<Simulation>(comm_, scene_, std::move(p), clock, std::move(options));
@@ -210,6 +210,7 @@ private:
             while (!sim.finished()) {
                 const double before = sim.time();
                 const Requests asked = advance();
+                for (const auto& words : outputs_->write_events(sim)) messages_.say(words);
                 facts_.loop_seconds = wall_clock() - begin;
                 facts_.peak_speed = std::max(facts_.peak_speed, sim.max_speed());
                 outputs_->write_due(sim, before, sim.finished());
@@ -245,7 +246,7 @@ private:
             const double time = sim_->time();
             const std::int64_t step = sim_->steps();
             if (!sim_->roll_back()) throw;
-            outputs_->take_back(sim_->time());
+            outputs_->take_back(*sim_);
             facts_.retries.push_back({{"failed_time", time}, {"failed_step", step}, {"from_time", sim_->time()}, {"message", e.what()}});
             messages_.say(fmt::format("retry: {}. Back to t = {:g} s, on with half the step", e.what(), sim_->time()));
             return {};

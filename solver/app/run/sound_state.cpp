@@ -1,4 +1,5 @@
 #include "solver/app/run/sound_state.hpp"
+#include "solver/scene/events.hpp"
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -81,7 +82,7 @@ std::int64_t doubled(const Comm& comm, const Particles& p, std::int64_t count)
 } // namespace
 
 void require_sound_state(const Comm& comm, const io::Checkpoint& from, const Particles& p, const Scene& scene,
-                         const scene::Filling& filling)
+                         const scene::Filling& filling, const Clock& clock)
 {
     const auto refuse = [&](const std::string& fault) {
         io::agree(comm, fault.empty() ? ""
@@ -90,8 +91,16 @@ void require_sound_state(const Comm& comm, const io::Checkpoint& from, const Par
                                                     from.file.string(), fault));
     };
     const std::int64_t count = filling.soil_count();
-    if (from.particles != count) refuse(fmt::format("it holds {} particles, the scene has {}", from.particles, count));
-    refuse(first_fault(p, scene, count));
+    if (std::size_t(clock.events) > scene.events.size())
+        refuse(fmt::format("{} events have begun in it, the scene has {}", clock.events, scene.events.size()));
+    const Scene stage = scene::stage_of(scene, clock.events, clock.time);
+    const std::int64_t present = scene::soil_present(stage, filling);
+    if (from.particles != present) refuse(fmt::format("it holds {} particles, the scene has {}", from.particles, present));
+    auto fault = first_fault(p, scene, count);
+    for (Index i = 0; i < p.size() && fault.empty(); ++i)
+        if (const int body = filling.body_of(p[field::id][i]); !stage.bodies[std::size_t(body)].present)
+            fault = fmt::format("particle {} is of {}, which is not there then", p[field::id][i], scene::name_of_body(scene, body));
+    refuse(fault);
     // So many, in range and none twice: each is there.
     const auto twice = doubled(comm, p, count);
     refuse(twice < 0 ? "" : fmt::format("id {} is there twice", twice));

@@ -5,6 +5,7 @@
 #include "solver/app/run/checkpoints.hpp"
 #include "solver/app/run/clock_text.hpp"
 #include "solver/app/run/sound_state.hpp"
+#include "solver/scene/events.hpp"
 #include <filesystem>
 #include <fmt/format.h>
 
@@ -49,15 +50,15 @@ StartState start_state(const Comm& comm, const Scene& scene, const scene::Fillin
         }
     }
     differs = comm.broadcast(differs);
-    if (differs.empty() && found->particles != filling.soil_count())
-        differs = fmt::format("it holds {} particles, the bodies here {}", found->particles, filling.soil_count());
+    if (const auto here = scene::soil_present(scene, filling); differs.empty() && found->particles != here)
+        differs = fmt::format("it holds {} particles, the bodies here {}", found->particles, here);
     if (!differs.empty())
         refuse(differs, "the same bodies, spacing and dimensions in both scenes; walls, effects and soils' numbers may differ");
 
     StartState start;
     Particles all;
     io::read_checkpoint(comm, *found, all);
-    require_sound_state(comm, *found, all, scene, filling);
+    require_sound_state(comm, *found, all, scene, filling, Clock{});
     start.from = found->file.string();
     start.time = clock_from_text(found->header, found->file).time;
     Particles& p = start.particles;

@@ -1,0 +1,48 @@
+#pragma once
+// What soil does to the named walls: force, moment and impulse, from the very accelerations that the walls give to the soil.
+#include "solver/run/clock.hpp"
+#include "solver/run/layout.hpp"
+#include "solver/scene/material.hpp"
+#include "solver/walls/surface.hpp"
+
+namespace kuzure {
+
+/// On one wall, since the start and now; in 2-D per metre of thickness.
+struct WallLoad {
+    std::string name;
+    Vector force;   // N
+    Vector moment;  // N m, about the scene's origin
+    Vector impulse; // N s, since the start
+};
+
+class WallForces {
+public:
+    /// All of them must outlive it. `energy_unit` (J) is the run's.
+    WallForces(const Scene&, std::span<const Material>, const Layout&);
+    /// The walls of the scene that have names, in its order; none where the scheme does not tell their forces.
+    static std::vector<int> named(const Scene&);
+    bool any() const { return !walls_.empty(); }
+    /// Adds what the present forces do in so many seconds on this rank. Throws NumbersFailed where it outgrows its unit.
+    void add_impulse(const Particles&, double seconds, Clock&);
+    /// Collective. `impulse` as in the clock of this rank.
+    std::vector<WallLoad> loads(const Team&, const Particles&, const Clock&);
+
+private:
+    /// visit(number in walls_, place, force on the wall) for every particle of a cluster and every named wall in its reach. A particle in
+    /// reach of several walls is shared among them by what its stress does to the faces of each, as the pair loop has it; the rest, of
+    /// viscosity and friction, by how much it sees of each.
+    template <class Visit> void for_each_force(const Particles&, Index cluster, Visit visit) const;
+    /// The faces behind which the wall points lie, where the walls near this rank are other ones than before.
+    void renew_faces();
+    double impulse_unit(const Clock&) const;
+
+    const Scene& scene_;
+    std::span<const Material> soils_;
+    const Layout& layout_;
+    std::vector<int> walls_;                            // those with names
+    std::vector<int> number_of_;                        // of each wall in walls_, -1 for one without a name
+    std::vector<std::vector<std::vector<Face>>> faces_; // of each point of each wall
+    std::int64_t faces_of_ = -1;                        // Layout::wall_renewals() for which they are
+};
+
+} // namespace kuzure

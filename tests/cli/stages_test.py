@@ -1,0 +1,372 @@
+#!/usr/bin/python3
+"""Events while a run goes on, forces on named walls, probes: the same bits on any ranks, threads and restarts between stages, a closed
+ledger, momentum to the last digits, and exit 2 for what contradicts itself."""
+import csv
+import json
+import math
+import os
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from harness import check, finish, program, scratch
+
+work = scratch("stages")
+
+DUG = """title = "excavation in three stages"
+dimensions = 2
+[space]
+spacing = 0.25
+[time]
+end = 0.6
+[soil.clay]
+density = 1900.0
+young = 2.0e7
+poisson = 0.3
+cohesion = 2.0e4
+friction_angle = 25.0
+cone = "plane strain"
+[[body]]
+soil = "clay"
+box = { low = [0.0, 0.0, 0.0], high = [4.0, 0.0, 4.0] }
+stress = "at rest"
+[[body]]
+name = "cut 1"
+soil = "clay"
+box = { low = [4.0, 0.0, 3.0], high = [8.0, 0.0, 4.0] }
+stress = "at rest"
+[[body]]
+name = "cut 2"
+soil = "clay"
+box = { low = [4.0, 0.0, 2.0], high = [8.0, 0.0, 3.0] }
+stress = "at rest"
+[[body]]
+name = "base"
+soil = "clay"
+box = { low = [4.0, 0.0, 0.0], high = [8.0, 0.0, 2.0] }
+stress = "at rest"
+[[wall]]
+name = "floor"
+box = { low = [-1.0, 0.0, -1.0], high = [9.0, 0.0, 0.0] }
+[[wall]]
+name = "left"
+box = { low = [-1.0, 0.0, 0.0], high = [0.0, 0.0, 5.0] }
+surface = "smooth"
+[[wall]]
+name = "right"
+box = { low = [8.0, 0.0, 0.0], high = [9.0, 0.0, 5.0] }
+surface = "smooth"
+[effects]
+gravity = [0.0, 0.0, -9.81]
+viscosity = { alpha = 0.1 }
+[accuracy]
+cfl = 0.5
+[output]
+history = 0.02
+every = 0.2
+"""
+# what is there for a while only
+FILL = """[[body]]
+name = "fill"
+soil = "clay"
+box = { low = [6.5, 0.0, 2.0], high = [8.0, 0.0, 2.5] }
+"""
+STRUT = """[[wall]]
+name = "strut"
+box = { low = [4.5, 0.0, 3.0], high = [5.5, 0.0, 4.0] }
+"""
+EXCAVATION = DUG.replace("[effects]", FILL + STRUT + "[effects]")
+STAGES = """[[event]]
+at = 0.1
+remove = "cut 1"
+[[event]]
+at = 0.25
+remove = ["cut 2"]
+add = "strut"
+[[event]]
+from = 0.3
+to = 0.45
+[event.soil.clay]
+strength = 0.5
+stiffness = 0.7
+[[event]]
+from = 0.35
+to = 0.5
+gravity = [2.0, 0.0, -9.81]
+[[event]]
+at = 0.4
+add = "fill"
+[[event]]
+at = 0.5
+damping = 0.2
+[[probe]]
+name = "toe"
+point = [3.9, 0.0, 2.0]
+[[probe]]
+body = "base"
+[[probe]]
+particle = 10
+"""
+# one soil that flows, or slides, in 2-D
+BLOCK = """title = "a block"
+dimensions = 2
+[space]
+spacing = 0.1
+{space}
+[time]
+end = {end}
+[soil.sand]
+density = 1800.0
+young = 2.0e6
+poisson = 0.3
+cohesion = {cohesion}
+friction_angle = 30.0
+cone = "shear"
+[[body]]
+name = "block"
+soil = "sand"
+box = {{ low = [0.0, 0.0, 0.0], high = [{width}, 0.0, 1.0] }}
+{body}
+[[wall]]
+name = "floor"
+box = {{ low = [-4.0, 0.0, -0.4], high = [8.0, 0.0, 0.0] }}
+{wall}
+[effects]
+gravity = {gravity}
+viscosity = {{ alpha = 0.1 }}
+{effects}
+[output]
+history = {history}
+[[probe]]
+body = "block"
+{more}
+"""
+
+
+def block(
+    end=0.5, cohesion=0.0, width=1.0, body="", wall="", gravity="[0.0, 0.0, -9.81]", effects="", history=0.01, space="", more=""
+):
+    return BLOCK.format(**locals())
+
+
+def scene(name, text):
+    path = os.path.join(work, name + ".toml")
+    with open(path, "w") as f:
+        f.write(text)
+    return path
+
+
+def run(path, out, ranks=1, threads=1, extra=(), expect=0):
+    command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    command += [program, "run", path, "-o", os.path.join(work, out), "--threads", str(threads), *extra]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    check(done.returncode == expect, f"{out}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-400:]}")
+    return done
+
+
+def summary(out):
+    with open(os.path.join(work, out, "summary.json")) as f:
+        return json.load(f)
+
+
+def raw(out, name):
+    with open(os.path.join(work, out, name), "rb") as f:
+        return f.read()
+
+
+def table(out, name):
+    """Rows of a table as dicts, numbers where they are some."""
+    with open(os.path.join(work, out, name)) as f:
+        rows = [r for r in csv.DictReader(f) if not next(iter(r.values())).startswith("#")]
+
+    def value(x):
+        try:
+            return float(x)
+        except ValueError:
+            return x
+
+    return [{k: value(x) for k, x in r.items()} for r in rows]
+
+
+TABLES = ("history.csv", "events.csv", "forces.csv", "probes.csv")
+
+
+def excavation():
+    path = scene("excavation", EXCAVATION + STAGES)
+    notes = json.loads(subprocess.run([program, "check", path, "--json"], capture_output=True, text=True, check=True).stdout)
+    events = [n["why"] for n in notes["effects"]["on"] if n["name"] == "event"]
+    check(len(events) == 6 and events[1] == "at t = 0.25 s: body cut 2 is removed; wall strut is added", f"check tells the events: {events[1]}")
+    out = run(path, "one").stdout
+    check("t = 0.1 s, event 0: body cut 1 is removed" in out, "the run says what happens")
+    one = summary("one")
+    for ranks, threads in ((1, 2), (2, 1), (4, 1)):
+        other = f"{ranks}x{threads}"
+        run(path, other, ranks, threads, ["--recut-every", "3"])
+        check(summary(other)["state_hash"] == one["state_hash"], f"{other}: the bits of 1 x 1")
+        for name in TABLES:
+            check(raw(other, name) == raw("one", name), f"{other}: the same {name}")
+    # a restart between stages, and after them
+    run(path, "legs", extra=["--set", "time.end=0.25"])
+    run(path, "legs", 2, extra=["--restart", "--set", "time.end=0.4"])
+    run(path, "legs", extra=["--restart"])
+    check(summary("legs")["state_hash"] == one["state_hash"], "three stages in three legs: the bits of one run")
+    rows = lambda out, name: raw(out, name).splitlines()  # noqa: E731
+    for name in TABLES[1:]:
+        check(set(rows("one", name)) <= set(rows("legs", name)), f"three legs: {name} has the rows of one run")
+    check(len(rows("legs", "events.csv")) == len(rows("one", "events.csv")) == 8, "no event is told twice")
+    run(path, "later", extra=["--set", "event.0.at=0.11"])
+    check(summary("later")["state_hash"] != one["state_hash"], "an event at another time gives other bits")
+
+    history = table("one", "history.csv")
+    worst = max(abs(r["residual"]) for r in history)
+    check(worst < 1e-3, f"the ledger closes through every event: {worst:.2e}")
+    check(abs(one["energy"]["events"]) > 1, f"which took {one['energy']['events']:.1f} J")
+    probes = table("one", "probes.csv")
+    base = [r for r in probes if r["probe"] == 1]
+    check(base[-1]["particles"] == 128 and base[-1]["stress_zz"] > 1.5 * base[0]["stress_zz"], "the base is unloaded")
+    strut = [r for r in table("one", "forces.csv") if r["wall"] == "strut"]
+    check(all(r["impulse_x"] == 0 for r in strut if r["time"] <= 0.25), "a wall that is not there bears nothing")
+
+
+def momentum():
+    """What walls gave in all is what soil lost: to the last digits."""
+    path = scene("thrown", block(body="velocity = [1.0, 0.0, -2.0]", cohesion=1000.0))
+    run(path, "thrown")
+    mass, g = 1800.0, 9.81
+    probes, forces = table("thrown", "probes.csv"), table("thrown", "forces.csv")
+    worst = 0
+    for p, f in zip(probes, forces):
+        lost = (mass * (1.0 - p["velocity_x"]), mass * (-2.0 - g * p["time"] - p["velocity_z"]))
+        worst = max(worst, abs(f["impulse_x"] - lost[0]), abs(f["impulse_z"] - lost[1]))
+    check(worst < 1e-10 * mass * 2, f"impulse on the floor against momentum lost: {worst / (2 * mass):.1e} of it")
+    check(forces[-1]["impulse_z"] < -mass * 2, "the floor stopped it")
+
+    box = """[[wall]]
+name = "left"
+box = { low = [-0.4, 0.0, 0.0], high = [0.0, 0.0, 1.6] }
+surface = "smooth"
+[[wall]]
+name = "right"
+box = { low = [1.0, 0.0, 0.0], high = [1.4, 0.0, 1.6] }
+surface = "smooth"
+"""
+    path = scene("resting", block(body='stress = "at rest"', more=box, effects="damping = { ratio = 0.5, until = 0.3 }", end=0.6))
+    run(path, "resting")
+    rows = {(r["wall"], round(r["time"], 2)): r for r in table("resting", "forces.csv")}
+    times = sorted({t for w, t in rows if t >= 0.35})
+    first, last = rows["floor", times[0]], rows["floor", times[-1]]
+    weight = -(last["impulse_z"] - first["impulse_z"]) / (last["time"] - first["time"])
+    check(abs(weight / (mass * g) - 1) < 1e-3, f"weight on the floor: {weight / (mass * g):.6f} of the soil's")
+    arm = rows["floor", times[-1]]["moment_y"] / rows["floor", times[-1]]["force_z"]
+    check(abs(-arm - 0.5) < 0.01, f"it acts in the middle, at x = {-arm:.4f} m")
+    sides = [rows[w, times[-1]]["force_x"] for w in ("left", "right")]
+    check(sides[0] < 0 < sides[1] and abs(sum(sides)) < 0.02 * sides[1], f"both sides bear as much: {sides[0]:.0f}, {sides[1]:.0f} N/m")
+
+
+def gate():
+    wall = """[[wall]]
+name = "gate"
+box = { low = [1.0, 0.0, 0.0], high = [1.4, 0.0, 1.6] }
+surface = "smooth"
+[[wall]]
+box = { low = [-0.4, 0.0, 0.0], high = [0.0, 0.0, 1.6] }
+surface = "smooth"
+"""
+    held = block(body='stress = "at rest"', more=wall + '[[event]]\nat = 0.1\nremove = "gate"\n')
+    free = block(body='stress = "at rest"', more="[[wall]]" + wall.split("[[wall]]")[2], end=0.4)
+    run(scene("held", held), "held")
+    run(scene("free", free), "free")
+    front = lambda out, t: min(table(out, "history.csv"), key=lambda r: abs(r["time"] - t))["front_max_x"]  # noqa: E731
+    before, after, never = front("held", 0.1), front("held", 0.5), front("free", 0.4)
+    check(before < 1.05, f"the gate holds: front at {before:.3f} m")
+    check(after > 1.3 and abs(after - never) < 0.1, f"0.4 s after: {after:.3f} m, without a gate ever {never:.3f} m")
+    # a wall put where soil stands
+    back = block(more=wall + '[[event]]\nat = 0.05\nremove = "gate"\n[[event]]\nat = 0.45\nadd = "gate"\n', body='stress = "at rest"')
+    done = run(scene("back", back), "back", expect=3)
+    check("wall gate is added" in done.stderr and "where soil stands" in done.stderr, "a wall does not come to stand in soil")
+
+
+def shaking():
+    with open(os.path.join(work, "record.csv"), "w") as f:
+        f.write("time,x\n" + "".join(f"{0.01 * k},{2 * math.sin(2 * math.pi * 2.5 * 0.01 * k)}\n" for k in range(41)))
+    shaken = block(
+        body='stress = "at rest"', wall='surface = "smooth"', cohesion=2e4, more='[[event]]\nat = 0.05\nshaking = "record.csv"\n', end=0.6
+    )
+    path = scene("shaken", shaken)
+    run(path, "shaken")
+    rows = table("shaken", "probes.csv")
+    omega, worst = 2 * math.pi * 2.5, 0
+    for r in rows:
+        t = min(max(r["time"] - 0.05, 0), 0.4)
+        worst = max(worst, abs(r["velocity_x"] + 2 / omega * (1 - math.cos(omega * t))))
+    check(worst < 2e-3 * 4 / omega, f"a block on ice stays while the ground shakes: {worst * omega / 4:.1e} of its speed")
+    worst = max(abs(r["residual"]) for r in table("shaken", "history.csv"))
+    check(worst < 1e-3, f"the ledger closes while it shakes: {worst:.2e}")
+    run(path, "shaken2", 2)
+    check(summary("shaken2")["state_hash"] == summary("shaken")["state_hash"], "2 ranks: the same bits")
+
+
+def slope():
+    """An infinite slope under a sideways gravity that grows slides at k = tan(phi - beta)."""
+    beta, phi, g, most, rise = math.radians(15), math.radians(30), 9.81, 0.5, 5.0
+    at = lambda k: f"[{g * (math.sin(beta) + k * math.cos(beta))}, 0.0, {-g * (math.cos(beta) - k * math.sin(beta))}]"  # noqa: E731
+    text = block(
+        gravity=at(0),
+        space='low = [0.0, 0.0, -1.0]\nhigh = [1.0, 0.0, 3.0]\nperiodic = ["x"]',
+        effects="damping = { ratio = 0.3, until = 0.5 }",
+        more=f"[[event]]\nfrom = 1.0\nto = {1 + rise}\ngravity = {at(most)}\n",
+        end=1 + 0.7 * rise,
+    ).replace("low = [-4.0, 0.0, -0.4], high = [8.0, 0.0, 0.0]", "low = [0.0, 0.0, -0.4], high = [1.0, 0.0, 0.0]")
+    run(scene("slope", text), "slope")
+    # the speed grows as the square of the time since: its root as the time
+    points = [(r["time"], math.sqrt(r["velocity_x"])) for r in table("slope", "probes.csv") if 0.02 < r["velocity_x"] < 0.5]
+    n, st, ss = len(points), sum(p[0] for p in points), sum(p[1] for p in points)
+    slope = (n * sum(a * b for a, b in points) - st * ss) / (n * sum(a * a for a, _ in points) - st * st)
+    begin = st / n - ss / n / slope
+    k, expected = most * (begin - 1) / rise, math.tan(phi - beta)
+    check(abs(k / expected - 1) < 0.03, f"critical acceleration {k:.4f} g against tan(phi - beta) = {expected:.4f}: {100 * (k / expected - 1):+.1f} %")
+
+
+def refused():
+    event = lambda lines: DUG + "[[event]]\n" + lines  # noqa: E731
+    two = lambda a, b: event(a) + "\n[[event]]\n" + b  # noqa: E731
+    wrong = {
+        "unknown name": (event('at = 0.1\nremove = "gate"'), 'found "gate"'),
+        "unknown soil": (event("at = 0.1\n[event.soil.caly]\ncohesion = 1.0"), 'did you mean "clay"'),
+        "unknown key": (event("at = 0.1\ngravty = [0.0, 0.0, 1.0]"), 'did you mean "gravity"'),
+        "no time": (event('remove = "floor"'), "expected either at, or from and to"),
+        "two times": (event('at = 0.1\nfrom = 0.2\nto = 0.3\nremove = "floor"'), "expected either at, or from and to"),
+        "backwards": (event("from = 0.3\nto = 0.2\ngravity = [0.0, 0.0, -5.0]"), "expected from < to"),
+        "nothing": (event("at = 0.1"), "expected something that changes"),
+        "wrong type": (event('at = "soon"\nremove = "floor"'), "event.0.at"),
+        "slow removal": (event('from = 0.1\nto = 0.2\nremove = "floor"'), "happens at once"),
+        "gone twice": (two('at = 0.1\nremove = "cut 1"', 'at = 0.2\nremove = "cut 1"'), "gone already"),
+        "there already": (two('at = 0.1\nremove = "cut 1"', 'at = 0.1\nadd = "cut 1"'), "one event at a time"),
+        "both at once": (two("at = 0.1\ngravity = [0.0, 0.0, -1.0]", "from = 0.05\nto = 0.2\ngravity = [0.0, 0.0, -2.0]"), "one event at a time"),
+        "strength and cohesion": (event("at = 0.1\n[event.soil.clay]\nstrength = 0.5\ncohesion = 1.0"), "expected strength or its parts"),
+        "no strength left": (event("at = 0.1\n[event.soil.clay]\ncohesion = 0.0\nfriction_angle = 0.0"), "a soil with strength"),
+        "no water": (event("at = 0.1\nwater = [[0.0, 1.0]]"), "expected a scene with still water"),
+        "no record": (event('at = 0.1\nshaking = "nothing.csv"'), "nothing.csv"),
+        "gravity along y": (event("at = 0.1\ngravity = [0.0, 1.0, -9.81]"), "no gravity along y"),
+        "stress added": (event('at = 0.1\nadd = "base"'), "expected a body without stress"),
+        "name twice": (DUG.replace('name = "left"', 'name = "floor"'), "no other wall or body has"),
+        "probe of two": (DUG + '[[probe]]\nbody = "base"\nparticle = 3\n', "exactly one of point, particle, body"),
+        "probe of nothing": (DUG + "[[probe]]\nparticle = 100000\n", "an id from 0 to"),
+        "overlap": ((EXCAVATION + STAGES).replace("low = [6.5, 0.0, 2.0]", "low = [6.5, 0.0, 1.5]"), "an overlap"),
+    }
+    for name, (text, words) in wrong.items():
+        done = run(scene("wrong", text), "wrong", expect=2)
+        check(words in done.stderr, f"{name}: {words}" + ("" if words in done.stderr else f": {done.stderr.strip()[-300:]}"))
+        check(not os.path.exists(os.path.join(work, "wrong")), f"{name}: nothing is written")
+
+
+def main():
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    for part in (excavation, momentum, gate, shaking, slope, refused):
+        print(f"# {part.__name__}", flush=True)
+        part()
+    finish()
+
+
+if __name__ == "__main__":
+    main()
