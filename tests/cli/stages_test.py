@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Events while a run goes on, forces on named walls, probes: the same bits on any ranks, threads and restarts between stages, a closed
-ledger, momentum to the last digits, and exit 2 for what contradicts itself."""
+ledger, momentum to the last digits, and exit 2 for what contradicts itself. Run as stages_test.py PROGRAM [PART...]."""
 import csv
 import json
 import math
@@ -188,6 +188,14 @@ def table(out, name):
     return [{k: value(x) for k, x in r.items()} for r in rows]
 
 
+def unaccounted(out):
+    """Of each row of the history, the energy that came from nowhere since the start, J; and the largest energy of the run."""
+    rows = table(out, "history.csv")
+    accounts = "kinetic potential elastic plastic viscous wall damping stabilising events".split()
+    sums = [sum(r[k] for k in accounts) for r in rows]
+    return [s - sums[0] for s in sums], max(r["kinetic"] + r["elastic"] + max(-r["potential"], 0) for r in rows)
+
+
 TABLES = ("history.csv", "events.csv", "forces.csv", "probes.csv")
 
 
@@ -217,9 +225,9 @@ def excavation():
     run(path, "later", extra=["--set", "event.0.at=0.11"])
     check(summary("later")["state_hash"] != one["state_hash"], "an event at another time gives other bits")
 
-    history = table("one", "history.csv")
-    worst = max(abs(r["residual"]) for r in history)
-    check(worst < 1e-3, f"the ledger closes through every event: {worst:.2e}")
+    excess, largest = unaccounted("one")
+    worst = max(map(abs, excess)) / largest
+    check(worst < 1e-3, f"the ledger closes through every event: {worst:.2e} of the largest energy")
     check(abs(one["energy"]["events"]) > 1, f"which took {one['energy']['events']:.1f} J")
     probes = table("one", "probes.csv")
     base = [r for r in probes if r["probe"] == 1]
@@ -230,16 +238,16 @@ def excavation():
 
 def momentum():
     """What walls gave in all is what soil lost: to the last digits."""
-    path = scene("thrown", block(body="velocity = [1.0, 0.0, -2.0]", cohesion=1000.0))
+    path = scene("thrown", block(body="velocity = [0.5, 0.0, -1.0]", end=0.3))
     run(path, "thrown")
     mass, g = 1800.0, 9.81
     probes, forces = table("thrown", "probes.csv"), table("thrown", "forces.csv")
     worst = 0
     for p, f in zip(probes, forces):
-        lost = (mass * (1.0 - p["velocity_x"]), mass * (-2.0 - g * p["time"] - p["velocity_z"]))
+        lost = (mass * (0.5 - p["velocity_x"]), mass * (-1.0 - g * p["time"] - p["velocity_z"]))
         worst = max(worst, abs(f["impulse_x"] - lost[0]), abs(f["impulse_z"] - lost[1]))
-    check(worst < 1e-10 * mass * 2, f"impulse on the floor against momentum lost: {worst / (2 * mass):.1e} of it")
-    check(forces[-1]["impulse_z"] < -mass * 2, "the floor stopped it")
+    check(worst < 1e-10 * mass, f"impulse on the floor against momentum lost: {worst / mass:.1e} of it")
+    check(forces[-1]["impulse_z"] < -mass, "the floor stopped it")
 
     box = """[[wall]]
 name = "left"
@@ -279,7 +287,7 @@ surface = "smooth"
     front = lambda out, t: min(table(out, "history.csv"), key=lambda r: abs(r["time"] - t))["front_max_x"]  # noqa: E731
     before, after, never = front("held", 0.1), front("held", 0.5), front("free", 0.4)
     check(before < 1.05, f"the gate holds: front at {before:.3f} m")
-    check(after > 1.3 and abs(after - never) < 0.1, f"0.4 s after: {after:.3f} m, without a gate ever {never:.3f} m")
+    check(after > 1.25 and abs(after - never) < 0.1, f"0.4 s after: {after:.3f} m, without a gate ever {never:.3f} m")
     # a wall put where soil stands
     back = block(more=wall + '[[event]]\nat = 0.05\nremove = "gate"\n[[event]]\nat = 0.45\nadd = "gate"\n', body='stress = "at rest"')
     done = run(scene("back", back), "back", expect=3)
@@ -295,13 +303,26 @@ def shaking():
     path = scene("shaken", shaken)
     run(path, "shaken")
     rows = table("shaken", "probes.csv")
-    omega, worst = 2 * math.pi * 2.5, 0
-    for r in rows:
-        t = min(max(r["time"] - 0.05, 0), 0.4)
-        worst = max(worst, abs(r["velocity_x"] + 2 / omega * (1 - math.cos(omega * t))))
-    check(worst < 2e-3 * 4 / omega, f"a block on ice stays while the ground shakes: {worst * omega / 4:.1e} of its speed")
-    worst = max(abs(r["residual"]) for r in table("shaken", "history.csv"))
-    check(worst < 1e-3, f"the ledger closes while it shakes: {worst:.2e}")
+    acceleration = [2 * math.sin(2 * math.pi * 2.5 * 0.01 * k) for k in range(41)]
+
+    def ground(time):
+        """Velocity of the ground: the integral of straight lines between the rows."""
+        t, v = min(max(time - 0.05, 0), 0.4), 0.0
+        for k in range(40):
+            part = min(max(t - 0.01 * k, 0), 0.01)
+            end = acceleration[k] + (acceleration[k + 1] - acceleration[k]) * part / 0.01
+            v += 0.5 * part * (acceleration[k] + end)
+        return v
+
+    fastest = max(ground(0.01 * k) for k in range(60))
+    worst = max(abs(r["velocity_x"] + ground(r["time"])) for r in rows)
+    check(worst < 1e-3 * fastest, f"a block on ice stays while the ground shakes: {worst / fastest:.1e} of its speed")
+    # what the shaking itself adds to the error of the ledger; the free sides' waves are in both
+    calm = scene("unshaken", shaken[: shaken.index("[[event]]")])
+    run(calm, "unshaken")
+    (with_it, largest), (without, _) = unaccounted("shaken"), unaccounted("unshaken")
+    worst = max(map(abs, with_it)) - max(map(abs, without))
+    check(worst < 1e-3 * largest, f"the ledger closes while it shakes: {worst / largest:+.1e} of the largest energy")
     run(path, "shaken2", 2)
     check(summary("shaken2")["state_hash"] == summary("shaken")["state_hash"], "2 ranks: the same bits")
 
@@ -319,7 +340,7 @@ def slope():
     ).replace("low = [-4.0, 0.0, -0.4], high = [8.0, 0.0, 0.0]", "low = [0.0, 0.0, -0.4], high = [1.0, 0.0, 0.0]")
     run(scene("slope", text), "slope")
     # the speed grows as the square of the time since: its root as the time
-    points = [(r["time"], math.sqrt(r["velocity_x"])) for r in table("slope", "probes.csv") if 0.02 < r["velocity_x"] < 0.5]
+    points = [(r["time"], math.sqrt(r["velocity_x"])) for r in table("slope", "probes.csv") if r["time"] > 1.5 and 0.02 < r["velocity_x"] < 0.5]
     n, st, ss = len(points), sum(p[0] for p in points), sum(p[1] for p in points)
     slope = (n * sum(a * b for a, b in points) - st * ss) / (n * sum(a * a for a, _ in points) - st * st)
     begin = st / n - ss / n / slope
@@ -341,7 +362,7 @@ def refused():
         "wrong type": (event('at = "soon"\nremove = "floor"'), "event.0.at"),
         "slow removal": (event('from = 0.1\nto = 0.2\nremove = "floor"'), "happens at once"),
         "gone twice": (two('at = 0.1\nremove = "cut 1"', 'at = 0.2\nremove = "cut 1"'), "gone already"),
-        "there already": (two('at = 0.1\nremove = "cut 1"', 'at = 0.1\nadd = "cut 1"'), "one event at a time"),
+        "there already": (two('at = 0.1\nremove = "left"', 'at = 0.1\nadd = "left"'), "one event at a time"),
         "both at once": (two("at = 0.1\ngravity = [0.0, 0.0, -1.0]", "from = 0.05\nto = 0.2\ngravity = [0.0, 0.0, -2.0]"), "one event at a time"),
         "strength and cohesion": (event("at = 0.1\n[event.soil.clay]\nstrength = 0.5\ncohesion = 1.0"), "expected strength or its parts"),
         "no strength left": (event("at = 0.1\n[event.soil.clay]\ncohesion = 0.0\nfriction_angle = 0.0"), "a soil with strength"),
@@ -362,7 +383,8 @@ def refused():
 
 def main():
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    for part in (excavation, momentum, gate, shaking, slope, refused):
+    parts = (excavation, momentum, gate, shaking, slope, refused)
+    for part in [p for p in parts if not sys.argv[2:] or p.__name__ in sys.argv[2:]]:
         print(f"# {part.__name__}", flush=True)
         part()
     finish()
