@@ -14,7 +14,7 @@ else()
 endif()
 
 # ---- what the program reads, and what people read ------------------------------------------------------------------------
-foreach(folder machines scenes studies scaling)
+foreach(folder machines scenes studies scaling paraview)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/jobs/${folder})
     install(DIRECTORY jobs/${folder} DESTINATION share/kuzure COMPONENT data)
   endif()

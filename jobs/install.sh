@@ -4,6 +4,7 @@
 #   jobs/install.sh tests    also what only the test suite needs
 #   jobs/install.sh extras   also a browser for the report's test, ffmpeg for films and a font for Japanese titles; Ubuntu has Chromium as a
 #                            snap only
+#   jobs/install.sh paraview also ParaView and a display in memory, 1.1 GB, for the test of its macro
 #   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
@@ -18,6 +19,7 @@ tests=(black clang-format valgrind binutils dpkg-dev fakeroot python3-jsonschema
     python3-pip python3-setuptools python3-wheel python3-matplotlib python3-pandas)
 extras=(ffmpeg fonts-ipafont-gothic)
 command -v chromium >/dev/null || extras+=(chromium)
+paraview=(paraview python3-paraview xvfb xauth libgl1-mesa-dri)
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
@@ -25,9 +27,10 @@ case "${1-}" in
 "") ;;
 tests) packages+=("${tests[@]}") ;;
 extras) packages+=("${extras[@]}") ;;
+paraview) packages+=("${tests[@]}" "${paraview[@]}") ;;
 cluster) packages+=("${tests[@]}" "${cluster[@]}") ;;
 *)
-    echo "usage: jobs/install.sh [tests|extras|cluster]" >&2
+    echo "usage: jobs/install.sh [tests|extras|paraview|cluster]" >&2
     exit 2
     ;;
 esac

@@ -67,6 +67,7 @@ def main():
         for file in (
             "share/kuzure/scenes/quickstart.toml",
             "share/kuzure/machines/slurm.toml",
+            "share/kuzure/paraview/kuzure_view.py",
             "lib/python3/dist-packages/kuzure/results.py",
             "share/kuzure/machines/slurm.job.sh",
             "share/doc/kuzure/README.md",
