@@ -24,7 +24,7 @@ set(KUZURE_PYTHON_DIR "lib/python3/dist-packages" CACHE STRING "where the Python
 install(DIRECTORY python/kuzure DESTINATION ${KUZURE_PYTHON_DIR} COMPONENT data FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
 install(DIRECTORY python/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/python COMPONENT data FILES_MATCHING PATTERN "*.py")
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT data)
-install(FILES README.md README.ja.md ARCHITECTURE.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT data)
+install(FILES README.md README.ja.md ARCHITECTURE.md CONTRIBUTING.md CHANGELOG.md SECURITY.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT data)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT data)
 
 # Completions and the manual page come out of the program's own tables of options, here and now, so they cannot be out
