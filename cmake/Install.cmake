@@ -14,13 +14,17 @@ else()
 endif()
 
 # ---- what the program reads, and what people read ------------------------------------------------------------------------
-foreach(folder machines scenes studies scaling)
+foreach(folder machines scenes studies scaling paraview)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/jobs/${folder})
     install(DIRECTORY jobs/${folder} DESTINATION share/kuzure COMPONENT data)
   endif()
 endforeach()
+# The Python package: found by Debian's python3 under /usr, elsewhere by PYTHONPATH or, better, pip install ./python.
+set(KUZURE_PYTHON_DIR "lib/python3/dist-packages" CACHE STRING "where the Python package is installed, under the prefix")
+install(DIRECTORY python/kuzure DESTINATION ${KUZURE_PYTHON_DIR} COMPONENT data FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
+install(DIRECTORY python/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/python COMPONENT data FILES_MATCHING PATTERN "*.py")
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT data)
-install(FILES README.md README.ja.md ARCHITECTURE.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT data)
+install(FILES README.md README.ja.md ARCHITECTURE.md CONTRIBUTING.md CHANGELOG.md SECURITY.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT data)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT data)
 
 # Completions and the manual page come out of the program's own tables of options, here and now, so they cannot be out
@@ -73,7 +77,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin) # a program without mpirun starts its daemon, too
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "fonts-ipafont-gothic | fonts-noto-cjk") # Japanese titles of pictures
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "paraview, ffmpeg")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3-h5py, python3-numpy, fonts-ipafont-gothic | fonts-noto-cjk") # the Python package; Japanese titles of pictures
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "paraview, ffmpeg, python3-matplotlib, python3-pandas")
 set(CPACK_STRIP_FILES ON)
 include(CPack)

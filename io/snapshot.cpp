@@ -1,6 +1,7 @@
 #include "io/snapshot.hpp"
 #include "io/hdf5.hpp"
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -207,6 +208,20 @@ Path last_snapshot(const Path& results)
         if (snapshot_number(e.path()) && last.filename() < e.path().filename()) last = e.path();
     if (last.empty()) throw IoFailed(fmt::format("{}: no snapshot is there: run the scene again", (results / "snapshots").string()));
     return last;
+}
+
+Path snapshot_next_to(const Path& results, double time)
+{
+    Path best = last_snapshot(results);
+    if (std::isinf(time)) return best;
+    double distance = HUGE_VAL;
+    for (const auto& e : std::filesystem::directory_iterator(results / "snapshots")) {
+        if (!snapshot_number(e.path())) continue;
+        const double d = std::fabs(H5Reader(e.path()).real("/VTKHDF", "time") - time);
+        // Two as near as each other: the earlier, in whatever order the directory names them.
+        if (d < distance || (d == distance && e.path().filename() < best.filename())) best = e.path(), distance = d;
+    }
+    return best;
 }
 
 // ---- series ---------------------------------------------------------------------------------------------------------

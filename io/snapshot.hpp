@@ -39,6 +39,9 @@ struct SoilSnapshot {
 SoilSnapshot read_snapshot(const Place& file);
 /// The newest snapshot of a result directory. Throws IoFailed where there is none.
 Path last_snapshot(const Path& results);
+/// The snapshot of a result directory whose time (s) is next to this one; infinite: the newest. Throws IoFailed where there is none or one
+/// is damaged.
+Path snapshot_next_to(const Path& results, double time);
 
 /// True of state_000000.hdf and its like; the number in it.
 std::optional<int> snapshot_number(const Path& file);

@@ -4,6 +4,7 @@
 #   jobs/install.sh tests    also what only the test suite needs
 #   jobs/install.sh extras   also a browser for the report's test, ffmpeg for films and a font for Japanese titles; Ubuntu has Chromium as a
 #                            snap only
+#   jobs/install.sh paraview also ParaView and a display in memory, 1.1 GB, for the test of its macro
 #   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
@@ -14,9 +15,11 @@ libraries=(libopenmpi-dev openmpi-bin libmetis-dev libhdf5-openmpi-dev libtomlpl
     libtiff-dev libgeotiff-dev libproj-dev libshp-dev libpugixml-dev libarchive-dev)
 scripts=(python3 python3-h5py python3-numpy)
 command -v gnuplot >/dev/null || scripts+=(gnuplot-nox) # its flavours exclude one another: any will do
-tests=(black clang-format valgrind binutils dpkg-dev fakeroot python3-jsonschema gdal-bin)
+tests=(black clang-format valgrind binutils dpkg-dev fakeroot python3-jsonschema gdal-bin
+    python3-pip python3-setuptools python3-wheel python3-matplotlib python3-pandas)
 extras=(ffmpeg fonts-ipafont-gothic)
 command -v chromium >/dev/null || extras+=(chromium)
+paraview=(paraview python3-paraview xvfb xauth libgl1-mesa-dri)
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
@@ -24,9 +27,10 @@ case "${1-}" in
 "") ;;
 tests) packages+=("${tests[@]}") ;;
 extras) packages+=("${extras[@]}") ;;
+paraview) packages+=("${tests[@]}" "${paraview[@]}") ;;
 cluster) packages+=("${tests[@]}" "${cluster[@]}") ;;
 *)
-    echo "usage: jobs/install.sh [tests|extras|cluster]" >&2
+    echo "usage: jobs/install.sh [tests|extras|paraview|cluster]" >&2
     exit 2
     ;;
 esac
@@ -48,10 +52,11 @@ if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
         "needed: a C++20 compiler (g++ 11 to 14), cmake 3.22+, ninja, git, make; an MPI; METIS 5; parallel HDF5 1.10+;" \
         "  toml++ 3.3+, CLI11 2, fmt 8+, libpng, Pango with Cairo (for pictures), nlohmann-json 3; libtiff 4, libgeotiff 1.7, PROJ 7+, shapelib," \
         "  pugixml and libarchive (for real ground); GoogleTest 1.12+, Google Benchmark; python3 with h5py and" \
-        "  numpy; gnuplot; for the tests black 23, clang-format 14, valgrind, binutils, GDAL's tools and python3-jsonschema." \
+        "  numpy; gnuplot; for the tests black 23, clang-format 14, valgrind, binutils, GDAL's tools, python3 with jsonschema, pip, setuptools," \
+        "  wheel, matplotlib and pandas." \
         "Fedora: dnf install gcc-c++ cmake ninja-build ccache git make openmpi-devel metis-devel hdf5-openmpi-devel tomlplusplus-devel" \
         "  cli11-devel fmt-devel libpng-devel pango-devel dejavu-sans-fonts json-devel gtest-devel gmock-devel google-benchmark-devel python3-h5py python3-jsonschema gnuplot" \
-        "  libtiff-devel libgeotiff-devel proj-devel shapelib-devel pugixml-devel libarchive-devel gdal" \
+        "  libtiff-devel libgeotiff-devel proj-devel shapelib-devel pugixml-devel libarchive-devel gdal python3-pip python3-setuptools python3-wheel python3-matplotlib python3-pandas" \
         "Debian names: ${packages[*]}"
 fi
 

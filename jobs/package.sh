@@ -44,7 +44,7 @@ fakeroot cpack -G DEB --config "$base/CPackConfig.cmake" -B "$PWD/$out" -D CPACK
 }
 deb=$(ls "$out"/*.deb)
 contents=$(dpkg -c "$deb")
-for file in bin/kuzure share/kuzure/machines/slurm.toml share/man/man1/kuzure.1 share/bash-completion/completions/kuzure \
+for file in bin/kuzure share/kuzure/machines/slurm.toml share/kuzure/scenes/bank.toml lib/python3/dist-packages/kuzure/results.py share/man/man1/kuzure.1 share/bash-completion/completions/kuzure \
     "${isas[@]/%//kuzure}"; do
     grep -qE " \./usr/(lib/kuzure/)?$file( |$)" <<<"$contents" || fail "$deb has no $file; see $PWD/build/package.log"
 done

@@ -21,6 +21,7 @@ namespace {
 
 const char* const help_footer = R"(
 First steps:
+  kuzure example bank > bank.toml         a ready scene to start from; kuzure example lists them
   kuzure check SCENE.toml                 what will be simulated, why, and how long it will take
   kuzure run SCENE.toml -o DIR            simulate; a bar shows where it is
   mpirun -n 4 kuzure run SCENE.toml       the same on four ranks, with the same bits
@@ -110,8 +111,10 @@ int main(int argc, char** argv)
     add_check(app, chosen);
     add_report(app, chosen);
     add_picture(app, chosen);
+    add_surface(app, chosen);
     add_job(app, chosen);
     add_study(app, chosen);
+    add_example(app, chosen);
     add_terrain(app, chosen);
     add_reference(app, chosen);
     add_scale(app, chosen);

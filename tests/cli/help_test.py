@@ -132,6 +132,9 @@ def main():
         ROOT / "README.md",
         ROOT / "README.ja.md",
         ROOT / "ARCHITECTURE.md",
+        ROOT / "CONTRIBUTING.md",
+        ROOT / "CHANGELOG.md",
+        ROOT / "SECURITY.md",
         ROOT / "perf/JOURNAL.md",
         *sorted((ROOT / "docs").glob("*.md")),
     ]:

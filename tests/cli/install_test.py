@@ -51,8 +51,8 @@ int main()
 """
 
 
-def run(*command, cwd=None, expected=0):
-    environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+def run(*command, cwd=None, expected=0, environment={}):
+    environment = {**os.environ, **environment, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=600, env=environment)
     need(done.returncode == expected, f"{' '.join(map(str, command))}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
     return done.stdout
@@ -67,6 +67,8 @@ def main():
         for file in (
             "share/kuzure/scenes/quickstart.toml",
             "share/kuzure/machines/slurm.toml",
+            "share/kuzure/paraview/kuzure_view.py",
+            "lib/python3/dist-packages/kuzure/results.py",
             "share/kuzure/machines/slurm.job.sh",
             "share/doc/kuzure/README.md",
             "share/doc/kuzure/docs/tutorial.md",
@@ -77,6 +79,15 @@ def main():
         ):
             need((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")
         need(run(program, "--version") == run(PROGRAM, "--version"), "--version of the installed program")
+
+        # The Python package beside it finds it; the gallery is its own.
+        script = "import kuzure; print(kuzure.__file__, kuzure.program(), *kuzure.examples())"
+        site = {"PYTHONPATH": str(prefix / "lib/python3/dist-packages"), "PATH": "/usr/bin:/bin", "KUZURE": ""}
+        (prefix / "share/kuzure/scenes/elsewhere.toml").write_text((prefix / "share/kuzure/scenes/quickstart.toml").read_text())
+        words = run("/usr/bin/python3", "-c", script, cwd=work, environment=site).split()
+        need(
+            words[0].startswith(str(prefix)) and words[1] == str(program) and "elsewhere" in words, f"the installed Python package: {words}"
+        )
 
         # Its own profiles, not the sources': one that is only there is found.
         profile = prefix / "share/kuzure/machines/slurm.toml"

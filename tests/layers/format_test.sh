@@ -34,7 +34,7 @@ found=$(cd "$planted" && ill_formatted bad.cpp bad.py bad_width.py good.cpp good
 if git rev-parse --git-dir >/dev/null 2>&1; then
     mapfile -d '' files < <(git ls-files -z '*.hpp' '*.cpp' '*.py')
 else
-    mapfile -d '' files < <(find solver decomposition io perf tests jobs docs \( -name '*.hpp' -o -name '*.cpp' -o -name '*.py' \) -print0)
+    mapfile -d '' files < <(find solver decomposition io perf python tests jobs docs \( -name '*.hpp' -o -name '*.cpp' -o -name '*.py' \) -print0)
 fi
 [ ${#files[@]} -gt 0 ] || { echo "no files found"; exit 1; }
 kept=()

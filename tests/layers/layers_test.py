@@ -54,7 +54,7 @@ FOREIGN = [
     (r"(proj\w*|x?tiffio|geo\w+|shapefil|archive\w*)\.h|pugixml\.hpp", "io/ground", "deep"),
     (r".*intrin\.h|arm_(neon|sve)\.h|experimental/simd", "solver/core/simd.hpp", "direct"),
 ]
-FOLDERS = {"solver", "decomposition", "io", "perf", "jobs", "tests", "docs", "cmake"}
+FOLDERS = {"solver", "decomposition", "io", "perf", "python", "jobs", "tests", "docs", "cmake"}
 GENERATED = {"build", "results"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

@@ -25,7 +25,7 @@ def column(result):
     return {
         "x at 5 mm (mm)": m["toe"],
         "height at 100 mm (mm)": float(np.interp(100.0, m["at"], m["height"])),
-        "stress noise": stress_noise(result.snapshot(1), COLUMN_DX, 2650.0),
+        "stress noise": stress_noise(result.snapshots[1], COLUMN_DX, 2650.0),
     }
 
 

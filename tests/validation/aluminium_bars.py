@@ -112,7 +112,7 @@ def measure(result, mm):
         y = np.interp(SURFACE[:, 0], at, curve)
         return 100 * np.sqrt(np.sum((y - SURFACE[:, 1]) ** 2) / np.sum(SURFACE[:, 1] ** 2))
 
-    history = result.history()
+    history = result.history
     return {
         "at": at,
         "height": height,

@@ -96,12 +96,12 @@ def measure(result, dx=0.04):
         "clumped": 100 * float((gap < 0.6).mean()),
         "cracks": cracks(points, dx),
         "drop": -float(s["displacement"][corner, 2]),
-        "front": float(result.history()["front_max_x"][-1]),
+        "front": float(result.history["front_max_x"][-1]),
         "points": points,
         "strain": s["plastic_strain"],
         "seconds": result.seconds,
-        "residual": 100 * abs(float(result.history()["residual"][-1])),
-        "band": shear_band(result.snapshot(2)),
+        "residual": 100 * abs(float(result.history["residual"][-1])),
+        "band": shear_band(result.snapshots[2]),
     }
 
 

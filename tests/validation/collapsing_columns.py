@@ -93,8 +93,8 @@ def measure(result, kind, a, across=None, level=None):
         rings = np.searchsorted(r, at + dx) - np.searchsorted(r, at - dx)
         profile = rings * dx**3 / (np.pi * ((at + dx) ** 2 - (at - dx) ** 2))
     front = 0.5 * (first_crossing(at, profile, level) + last_crossing(at, profile, level))  # the profile is noisy there
-    history = result.history()
-    last = history[-1]
+    history = result.history
+    last = {name: column[-1] for name, column in history.items()}
     seen = (
         [last["front_max_x"]] if kind == "plane" else [-last["front_min_x"], last["front_max_x"], -last["front_min_y"], last["front_max_y"]]
     )

@@ -10,14 +10,18 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 
-import h5py
 import numpy as np
 
 from known import MISSES
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
+sys.path.insert(0, os.path.join(ROOT, "python"))
+import kuzure
+from kuzure.tables import read_table
+
 PROGRAM = os.path.abspath(os.environ.get("KUZURE", os.path.join(ROOT, "build", "release", "kuzure")))
 RESULTS = os.path.abspath(os.environ.get("KUZURE_RESULTS", os.path.join(ROOT, "results", "validation")))
 FIGURES = os.path.abspath(os.environ.get("KUZURE_FIGURES", os.path.join(RESULTS, "figures")))
@@ -26,35 +30,18 @@ GRAVITY = 9.81  # m/s^2
 
 
 # ---------------------------------------------------------------------------------------------- scenes
-def toml_value(v):
-    if isinstance(v, bool):
-        return "true" if v else "false"
-    if isinstance(v, str):
-        return json.dumps(v)
-    if isinstance(v, (list, tuple)):
-        return "[" + ", ".join(toml_value(x) for x in v) + "]"
+def rounded(v):
+    """Numbers without the last digits in which 3 * 0.1 differs from 0.3, in whatever they stand."""
     if isinstance(v, dict):
-        return "{ " + ", ".join(f"{k} = {toml_value(x)}" for k, x in v.items()) + " }"
-    if isinstance(v, (int, np.integer)):
-        return str(int(v))
-    return repr(round(float(v), 12))
+        return {k: rounded(x) for k, x in v.items()}
+    if isinstance(v, (list, tuple)):
+        return [rounded(x) for x in v]
+    return round(float(v), 12) if isinstance(v, (float, np.floating)) else v
 
 
 def toml(scene):
     """Text of a scene given as nested dicts: `soil` holds named soils, `body` and `wall` are lists."""
-    lines = [f"{k} = {toml_value(v)}" for k, v in scene.items() if not isinstance(v, (dict, list))]
-    for section, content in scene.items():
-        if section == "soil":
-            tables = [(f"[soil.{name}]", soil) for name, soil in content.items()]
-        elif section in ("body", "wall"):
-            tables = [(f"[[{section}]]", table) for table in content]
-        elif isinstance(content, dict):
-            tables = [(f"[{section}]", content)]
-        else:
-            continue
-        for head, table in tables:
-            lines += ["", head] + [f"{k} = {toml_value(v)}" for k, v in table.items()]
-    return "\n".join(lines) + "\n"
+    return kuzure.to_toml(rounded(scene))
 
 
 def changed(scene, changes):
@@ -104,31 +91,16 @@ class RunFailed(Exception):
     pass
 
 
-class Run:
+class Run(kuzure.Run):
     """A finished run: its summary, history and snapshots."""
 
-    def __init__(self, directory):
-        self.dir = directory
-        with open(os.path.join(directory, "summary.json")) as f:
-            self.summary = json.load(f)
-        self.seconds = self.summary["wall_seconds"]
+    @property
+    def seconds(self):
+        return self.summary["wall_seconds"]
 
+    @property
     def history(self):
-        return np.genfromtxt(os.path.join(self.dir, "history.csv"), delimiter=",", names=True, comments="#")
-
-    def snapshot_files(self):
-        folder = os.path.join(self.dir, "snapshots")
-        return sorted(os.path.join(folder, f) for f in os.listdir(folder) if f.startswith("state_") and f.endswith(".hdf"))
-
-    def snapshot(self, number=-1):
-        """Soil particles of a snapshot, ordered by id."""
-        with h5py.File(self.snapshot_files()[number], "r") as f:
-            data = f["VTKHDF/PointData"]
-            soil = data["kind"][:] == 0
-            order = np.argsort(data["id"][:][soil])
-            out = {name: data[name][:][soil][order] for name in data}
-            out["position"] = f["VTKHDF/Points"][:][soil][order]
-        return out
+        return read_table(self.directory / "history.csv")  # arrays, with pandas or without
 
 
 def run(scene, case, name, minutes=8.0, fresh=False):

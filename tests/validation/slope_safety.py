@@ -66,9 +66,9 @@ def scene(srf, cone, across=20, **changes):
 
 def measure(result):
     """Greatest displacement since the end of damping, twice a second."""
-    count, first = len(result.snapshot_files()), int(SETTLE / 0.5)
-    settled = result.snapshot(first)["displacement"]
-    d = np.array([np.linalg.norm(result.snapshot(k)["displacement"] - settled, axis=1).max() for k in range(first, count)])
+    count, first = len(result.snapshots), int(SETTLE / 0.5)
+    settled = result.snapshots[first]["displacement"]
+    d = np.array([np.linalg.norm(result.snapshots[k]["displacement"] - settled, axis=1).max() for k in range(first, count)])
     accelerates = bool(d[2] > 2 * d[1])
     still = bool(d[-1] - d[-5] < 1e-5 * H)  # over the last two seconds
     return {

@@ -43,6 +43,8 @@ void add_picture(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_terrain(CLI::App&, Action& chosen);
+void add_example(CLI::App&, Action& chosen);
+void add_surface(CLI::App&, Action& chosen);
 void add_completion(CLI::App&, Action& chosen);
 
 /// A line for the user, on standard error. Never throws: where it cannot be written, the work goes on.
