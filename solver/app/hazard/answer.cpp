@@ -13,6 +13,7 @@ namespace kuzure::hazard {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double least_ratio = 1.15; // of two spacings whose answers are compared
 
 scene::MapGrid grid_of(const scene::Grid& g) { return {g.x - 0.5 * g.cell, g.y - 0.5 * g.cell, g.cell, g.columns, g.rows}; }
 
@@ -229,7 +230,10 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
         out.discretisation.samples.push_back({r->layers, r->maps->reach});
     }
     auto& d = out.discretisation;
-    if (samples.size() > 3) samples.erase(samples.begin(), samples.end() - 3); // the finest tell most
+    // Neighbours that are nearly alike say nothing of an order: the finest of them counts; and the three finest tell most.
+    for (std::size_t k = samples.size(); k > 1; --k)
+        if (samples[k - 2].spacing < least_ratio * samples[k - 1].spacing) samples.erase(samples.begin() + std::ptrdiff_t(k) - 2);
+    if (samples.size() > 3) samples.erase(samples.begin(), samples.end() - 3);
     const auto [least, most] = std::ranges::minmax_element(samples, {}, &study::Sample::value);
     if (samples.size() < 2) {
         d.half_width = nan, d.how = "unknown: the likely values were run at one resolution only";
@@ -237,9 +241,9 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
         d.kind = Discretisation::Difference, d.half_width = most->value - least->value;
         d.how = "the difference of two resolutions; no order of convergence is known from two";
     } else if (const auto c = study::converge(samples); c.order) {
-        d.kind = Discretisation::Richardson, d.half_width = c.half_width, d.order = *c.order;
-        d.how = fmt::format("Richardson extrapolation of three resolutions, observed order {:.2g}, {:g} times the estimated error",
-                            *c.order, study::safety);
+        d.kind = Discretisation::Richardson, d.half_width = c.half_width, d.order = std::min(*c.order, study::greatest_order);
+        d.how = fmt::format("Richardson extrapolation of three resolutions, order {:.2g}{}, {:g} times the estimated error", d.order,
+                            *c.order > d.order ? fmt::format(" (observed {:.2g}, which is chance)", *c.order) : "", study::safety);
     } else {
         d.kind = Discretisation::Spread, d.half_width = most->value - least->value;
         d.how = fmt::format("the spread of three resolutions: no extrapolation, {}", c.why_not);

@@ -33,6 +33,7 @@ Plan make_plan(const Cost& c, double left, int members, double layers)
     p.members = members > 0 ? members : usual_members;
     if (members == 0 && layers == 0 && layers_of(2 * usual_members) >= 6) p.members = 2 * usual_members;
     p.layers = layers > 0 ? layers : std::max(c.layers, layers_of(p.members));
+    if (layers == 0 && p.layers < 1.15 * c.layers) p.layers = c.layers; // hardly finer is not worth a likely run of its own
     if (members == 0 && c.seconds(p.layers) * (p.members + 1) > 0.9 * left)
         p.members = std::clamp(int(0.9 * left / c.seconds(p.layers)) - 1, 3, usual_members);
     p.seconds = c.seconds(p.layers) * (p.members + 1);

@@ -159,13 +159,17 @@ double height_error(const scene::HeightError& e, std::uint64_t seed, double x, d
     // Normal numbers at the points of a square grid, smoothed by quadratic B-splines and scaled so that each place has the same spread. No
     // function of a mathematics library comes in, whose last digits differ between machines.
     const auto normal = [&](std::int64_t i, std::int64_t j) {
-        std::uint64_t z = seed + 0x9e3779b97f4a7c15ull * std::uint64_t(i) + 0xc2b2ae3d27d4eb4full * std::uint64_t(j);
+        const auto mixed = [](std::uint64_t v) { // splitmix64's
+            v = (v ^ (v >> 30)) * 0xbf58476d1ce4e5b9ull;
+            v = (v ^ (v >> 27)) * 0x94d049bb133111ebull;
+            return v ^ (v >> 31);
+        };
+        // Of neighbours and of other seeds nothing in common.
+        std::uint64_t z = mixed(mixed(seed + std::uint64_t(i)) + std::uint64_t(j));
         double sum = -6; // of twelve numbers in [0, 1): variance 1
         for (int k = 0; k < 12; ++k) {
             z += 0x9e3779b97f4a7c15ull;
-            std::uint64_t v = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-            v = (v ^ (v >> 27)) * 0x94d049bb133111ebull;
-            sum += double((v ^ (v >> 31)) >> 11) * 0x1p-53;
+            sum += double(mixed(z) >> 11) * 0x1p-53;
         }
         return sum;
     };

@@ -97,9 +97,7 @@ public:
         begin_plan();
         // What cannot run shall not begin: the corners of what is uncertain are read as a run reads them.
         for (const bool high : {false, true}) {
-            Member m{0, {}, 0};
-            for (const auto& input : inputs_of(base_.uncertain)) m.values.push_back(high ? input.range.high : input.range.low);
-            if (base_.uncertain.thickness) continue; // of rasters that are not there yet
+            const auto m = corner_member(base_.uncertain, high);
             const auto r = run_scene(base_, preliminary_spacing_, m, high ? "highest" : "lowest", {});
             io::parse_scene(r.text, fmt::format("{} with the {} values of [uncertain]", args_.scene.file, high ? "high" : "low"), r.sets);
         }

@@ -71,6 +71,14 @@ Member likely_member(const scene::Uncertain& u)
     return m;
 }
 
+Member corner_member(const scene::Uncertain& u, std::optional<bool> high)
+{
+    Member m;
+    for (const auto& input : inputs_of(u))
+        m.values.push_back(input.name == "thickness" ? 1 : !high ? input.range.likely : *high ? input.range.high : input.range.low);
+    return m;
+}
+
 namespace {
 
 std::vector<double> ranks(std::span<const double> x)

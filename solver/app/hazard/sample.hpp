@@ -48,6 +48,8 @@ struct Member {
 std::vector<Member> draw_members(const scene::Uncertain&, int group, int count);
 /// All inputs at their likely values, the ground as it was measured.
 Member likely_member(const scene::Uncertain&);
+/// All inputs at their low, likely or high values, but the thickness as the scene has it: a scene that needs no files of its own.
+Member corner_member(const scene::Uncertain&, std::optional<bool> high);
 
 /// Spearman's rank correlation, equal values with their mean rank; NaN where one of the two does not vary.
 double rank_correlation(std::span<const double> x, std::span<const double> y);
