@@ -83,12 +83,17 @@ const Key* KeyTable::find(std::string_view path) const { return row(pattern_of(p
 
 std::string KeyTable::pattern_of(std::string_view path) const
 {
-    const auto first = path.find('.');
-    const auto head = path.substr(0, first);
-    const Key* many = first == path.npos ? nullptr : row(head);
-    if (!many || (many->kind != Kind::Named && many->kind != Kind::Tables)) return std::string(path);
-    const auto second = path.find('.', first + 1);
-    return std::string(head) + ".*" + std::string(second == path.npos ? "" : path.substr(second));
+    std::string pattern;
+    bool name = false; // of a table among many
+    for (std::size_t begin = 0; begin <= path.size();) {
+        const auto end = std::min(path.find('.', begin), path.size());
+        pattern += pattern.empty() ? "" : ".";
+        pattern += name ? std::string_view("*") : path.substr(begin, end - begin);
+        const Key* key = name ? nullptr : row(pattern);
+        name = key && (key->kind == Kind::Named || key->kind == Kind::Tables);
+        begin = end + 1;
+    }
+    return pattern;
 }
 
 const std::vector<const Key*>& KeyTable::inside(std::string_view pattern) const

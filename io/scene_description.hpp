@@ -417,6 +417,12 @@ template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>
                            a.number(q + ".length", e.length,
                                     {.unit = "m", .range = size, .example = "50.0", .doc = "over which errors are alike"});
                        });
+               a.numbers(p + ".pressures", u.pressures,
+                         {.unit = "kPa",
+                          .range = above_to(0, 1e6),
+                          .fallback = "[3.0, 30.0]",
+                          .example = "[3.0, 30.0]",
+                          .doc = "dynamic pressures whose exceedance is mapped"});
                a.tables(p + ".key", u.keys, {.optional = true, .example = "[[uncertain.key]]", .doc = "any other number of the scene"},
                         [&](const std::string& q, scene::UncertainKey& k) {
                             a.text(q + ".key", k.key, {.example = "\"soil.debris.cohesion\"", .doc = "its path"});
@@ -426,12 +432,6 @@ template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>
                             number(".low", k.value.low, "least value"), number(".likely", k.value.likely, "most likely value"),
                                 number(".high", k.value.high, "greatest value");
                         });
-               a.numbers(p + ".pressures", u.pressures,
-                         {.unit = "kPa",
-                          .range = above_to(0, 1e6),
-                          .fallback = "[3.0, 30.0]",
-                          .example = "[3.0, 30.0]",
-                          .doc = "dynamic pressures whose exceedance is mapped"});
            });
 }
 

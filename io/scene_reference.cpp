@@ -196,7 +196,8 @@ std::string scene_reference()
     for (const Key& key : scene_keys()) {
         const bool group =
             key.kind == Kind::Named || key.kind == Kind::Tables || (key.kind == Kind::Table && key.path.find('.') == key.path.npos);
-        const std::string head = key.path.find('.') == key.path.npos ? "" : key.path.substr(0, key.path.find('.'));
+        const auto one_of_many = key.path.find(".*"), dot = key.path.find('.');
+        const std::string head = dot == key.path.npos ? "" : key.path.substr(0, one_of_many == key.path.npos ? dot : one_of_many);
         const std::string here = group ? key.path : head;
         if (key.path == "soil.*") continue;
         if (here != section) {

@@ -115,7 +115,8 @@ public:
         publish(false);
 
         const Plan plan = plan_ensemble();
-        if (varied_ && !over()) ensemble(plan);
+        if (varied_) ensemble(plan);
+        if (over()) not_finer({"no time was left", "時間切れ"});
         while (!over() && finer()) {}
         while (!over() && more_members()) {}
         return end();
@@ -414,7 +415,7 @@ private:
         const double each = cost_.start + (cost_.seconds(base_.layers_of(spacing)) - cost_.start) * std::min(jobs_, cores_);
         say(fmt::format("ensemble: {} members with {:.3g} layers, about {} each", p.members, base_.layers_of(spacing), seconds_text(each)));
         work(todo, jobs_, threads, each);
-        publish(false);
+        if (!over()) publish(false);
         // What one of them took tells what a finer one will.
         double sum = 0;
         int n = 0;
@@ -463,7 +464,7 @@ private:
         work({&r}, 1, cores_, layers_.given ? 0 : std::min(expected, 0.98 * left()));
         if (!r.finished()) return false;
         cost_ = cost_of(r);
-        publish(false);
+        if (!over()) publish(false);
         return true;
     }
     bool not_finer(Words why)
