@@ -1,20 +1,15 @@
 #include "solver/app/hazard/runner.hpp"
-#include "io/ground/crs.hpp"
 #include "io/owner.hpp"
 #include "solver/app/hazard/page.hpp"
 #include "solver/app/hazard/plan.hpp"
+#include "solver/app/hazard/queue.hpp"
 #include "solver/app/run/maps.hpp"
-#include "solver/app/study/child.hpp"
 #include "solver/core/wall_clock.hpp"
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <deque>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <list>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 namespace kuzure::hazard {
 namespace {
@@ -22,28 +17,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step: reading, forecast
-
-void say(const std::string& text)
-{
-    fmt::print("{}\n", text);
-    std::fflush(stdout);
-}
-
-std::string seconds_text(double s) { return s < 100 ? fmt::format("{:.1f} s", s) : fmt::format("{:.1f} min", s / 60); }
-
-/// The last line that a child said.
-std::string last_words(const io::Path& log)
-{
-    std::string text;
-    try {
-        text = io::read_text(log);
-    } catch (const IoFailed& e) {
-        return e.what();
-    }
-    while (!text.empty() && text.back() == '\n') text.pop_back();
-    text = text.substr(text.rfind('\n') + 1);
-    return text.starts_with("kuzure: ") ? text.substr(8) : text;
-}
 
 /// "1 to 4, 7"
 std::string ranges_of(std::vector<int> numbers)
@@ -91,7 +64,7 @@ public:
 
     Exit go()
     {
-        if (!args_.members_from.empty()) return from_members();
+        if (!args_.members_from.empty()) return answer_again(base_, args_, points_, out_);
         require_ours();
         fixed_spacing_ = !base_.scene.start.from.empty();
         begin_plan();
@@ -103,12 +76,14 @@ public:
         }
         open();
         stop_.emplace();
+        queue_.emplace(
+            base_, out_, within_, [this] { return left(); }, [this] { return stop_->came(); }, [this] { publish_now_and_then(); });
         reserve_ = std::clamp(0.02 * within_, 0.3, 2.0);
 
         say(fmt::format("{}: an answer within {}, {} in {}", base_.scene.title, seconds_text(within_),
                         jobs_ > 1 ? fmt::format("{} runs at a time", jobs_) : "one run at a time", out_.string()));
-        auto& first = add(Part::Preliminary, likely_member(base_.uncertain), preliminary_spacing_, "preliminary");
-        work({&first}, 1, cores_, 0);
+        auto& first = queue_->add(Part::Preliminary, likely_member(base_.uncertain), preliminary_spacing_, "preliminary");
+        queue_->work({&first}, 1, cores_, 0);
         if (first.status == Status::Refused)
             throw BadInput(fmt::format("the scene was refused at {:.3g} layers: {}", first.layers, first.message));
         cost_ = cost_of(first);
@@ -195,185 +170,6 @@ private:
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));
     }
 
-    // ---- runs
-
-    Run& add(Part part, Member m, double spacing, const std::string& name)
-    {
-        auto& r = runs_.emplace_back();
-        r.part = part, r.member = std::move(m), r.spacing = spacing, r.layers = base_.layers_of(spacing), r.directory = name;
-        return r;
-    }
-    static std::string flat(const Run& r)
-    {
-        std::string name = r.directory.string();
-        std::replace(name.begin(), name.end(), '/', '-');
-        return name;
-    }
-
-    /// A run's scene on the disk; whether that is the one that was there before.
-    bool prepare(Run& r, RunScene& scene)
-    {
-        const std::string name = flat(r), title = r.part == Part::Member ? fmt::format("member {}", r.member.number) : word(r.part);
-        scene = run_scene(base_, r.spacing, r.member, title, out_ / "inputs" / name);
-        r.notes = scene.notes;
-        std::string text = scene.text;
-        for (const auto& s : scene.sets) text = fmt::format("# with {}\n", s) + text;
-        const io::Path file = out_ / "scenes" / (name + ".toml");
-        std::error_code error;
-        const bool same = std::filesystem::exists(file, error) && io::read_text(file) == text;
-        if (!same) {
-            std::filesystem::remove_all(out_ / r.directory, error);
-            io::write_atomically(file, text);
-        }
-        return same;
-    }
-
-    /// What is left of an earlier call: takes what is finished, waits for a run that is still ending.
-    void take_what_is_there(Run& r)
-    {
-        const io::Path where = out_ / r.directory;
-        std::error_code error;
-        if (!std::filesystem::is_directory(where, error)) return;
-        for (int k = 0; k < 100; ++k) {
-            try {
-                io::Ownership::refuse_if_owned(io::hold(where));
-                break;
-            } catch (const BadInput&) {
-                std::this_thread::sleep_for(std::chrono::milliseconds(200));
-            }
-        }
-        try {
-            const auto j = nlohmann::json::parse(io::read_text(where / "summary.json"));
-            if (j.at("status") == "finished") {
-                r.seconds = j.value("wall_seconds", 0.0);
-                finish(r);
-            } else if (j.at("status") == "numbers failed") {
-                r.status = Status::Failed, r.message = j.value("message", std::string());
-            }
-        } catch (const std::exception&) { // not ended, or not whole: it is run again
-            r.status = Status::NotRun;
-        }
-        // Without a checkpoint it begins anew, and kuzure would move aside what it had begun.
-        if (r.status == Status::NotRun && !std::filesystem::exists(where / "checkpoint.h5", error) &&
-            !std::filesystem::exists(where / "checkpoint.prev.h5", error))
-            std::filesystem::remove_all(where, error);
-    }
-
-    void finish(Run& r)
-    {
-        r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_for(base_.scene, base_.coarsest).wet));
-        r.status = Status::Finished;
-        // Only the results count: a checkpoint of each of many runs would fill the disk.
-        std::error_code error;
-        for (const char* name : {"checkpoint.h5", "checkpoint.prev.h5"}) std::filesystem::remove(out_ / r.directory / name, error);
-    }
-
-    struct Running {
-        study::Child child;
-        Run* run;
-        double began;
-    };
-
-    /// Runs what fits before the deadline, in order. `expected`: s each, until the first has ended.
-    void work(std::vector<Run*> todo, int jobs, int threads, double expected)
-    {
-        std::list<Running> running;
-        std::size_t next = 0;
-        double sum = 0;
-        int measured = 0;
-        bool stopping = false;
-        double stop_began = 0;
-        while (next < todo.size() || !running.empty()) {
-            while (!over() && next < todo.size() && int(running.size()) < jobs) {
-                if (measured > 0) expected = sum / measured;
-                if (expected > left()) break;
-                Run& r = *todo[next++];
-                if (r.status != Status::NotRun && r.status != Status::Stopped) continue;
-                if (auto started = start(r, threads)) running.push_back(std::move(*started));
-            }
-            if (running.empty()) break;
-            for (auto at = running.begin(); at != running.end();) {
-                const auto ended = at->child.ended();
-                if (!ended) {
-                    ++at;
-                    continue;
-                }
-                at->run->seconds += now() - at->began;
-                conclude(*at->run, *ended);
-                if (at->run->finished()) sum += at->run->seconds, ++measured;
-                at = running.erase(at);
-                publish_now_and_then();
-            }
-            if (over() && !stopping) {
-                stopping = true, stop_began = now();
-                for (auto& r : running) r.child.send(SIGTERM);
-            }
-            if (stopping && now() - stop_began > std::max(2.0, 0.03 * within_))
-                for (auto& r : running) r.child.send(SIGKILL);
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
-    }
-
-    std::optional<Running> start(Run& r, int threads)
-    {
-        RunScene scene;
-        try {
-            const bool same = prepare(r, scene);
-            if (same) take_what_is_there(r);
-        } catch (const BadInput& e) {
-            r.status = Status::Refused, r.message = e.what();
-            return std::nullopt;
-        }
-        if (r.status == Status::Finished || r.status == Status::Failed) {
-            say(fmt::format("  {}: there already, {}", r.directory.string(), word(r.status)));
-            return std::nullopt;
-        }
-        const std::string name = flat(r);
-        std::vector<std::string> words{"run",
-                                       (out_ / "scenes" / (name + ".toml")).string(),
-                                       "-o",
-                                       (out_ / r.directory).string(),
-                                       "--restart",
-                                       "--threads",
-                                       std::to_string(threads),
-                                       "--quiet"};
-        for (const auto& s : scene.sets) words.insert(words.end(), {"--set", s});
-        return Running{study::Child(words, out_ / "logs" / (name + ".txt")), &r, now()};
-    }
-
-    void conclude(Run& r, const study::ChildResult& ended)
-    {
-        const io::Path log = out_ / "logs" / (flat(r) + ".txt");
-        switch (ended.exit_code) {
-        case 0:
-            try {
-                finish(r);
-            } catch (const BadInput& e) {
-                r.status = Status::Failed, r.message = e.what();
-            } catch (const IoFailed& e) {
-                r.status = Status::Failed, r.message = e.what();
-            }
-            break;
-        case 2:
-            r.status = Status::Refused, r.message = last_words(log);
-            break;
-        case 5:
-        case 128 + SIGTERM:
-        case 128 + SIGINT:
-        case 128 + SIGKILL:
-            r.status = Status::Stopped;
-            break;
-        default:
-            r.status = Status::Failed, r.message = ended.exit_code == 3 || ended.exit_code == 4
-                                                       ? last_words(log)
-                                                       : fmt::format("ended with exit code {}", ended.exit_code);
-        }
-        if (r.finished())
-            say(fmt::format("  {}: {:.3g} layers, reach {:.4g} m, {}", r.directory.string(), r.layers, r.maps->reach,
-                            seconds_text(r.seconds)));
-        else say(fmt::format("  {}: {}{}", r.directory.string(), word(r.status), r.message.empty() ? "" : ": " + r.message));
-    }
-
     // ---- what is run
 
     /// Of a run with all cores.
@@ -409,12 +205,12 @@ private:
         const double spacing = ensemble_spacing(p.layers);
         const int threads = std::max(1, cores_ / jobs_);
         std::vector<Run*> todo;
-        if (spacing != preliminary_spacing_) todo.push_back(&add(Part::Likely, likely_member(base_.uncertain), spacing, "likely"));
+        if (spacing != preliminary_spacing_) todo.push_back(&queue_->add(Part::Likely, likely_member(base_.uncertain), spacing, "likely"));
         for (auto& m : draw_members(base_.uncertain, group_, p.members))
-            todo.push_back(&add(Part::Member, m, spacing, fmt::format("members/{:03}", m.number)));
+            todo.push_back(&queue_->add(Part::Member, m, spacing, fmt::format("members/{:03}", m.number)));
         const double each = cost_.start + (cost_.seconds(base_.layers_of(spacing)) - cost_.start) * std::min(jobs_, cores_);
         say(fmt::format("ensemble: {} members with {:.3g} layers, about {} each", p.members, base_.layers_of(spacing), seconds_text(each)));
-        work(todo, jobs_, threads, each);
+        queue_->work(todo, jobs_, threads, 0); // until one is measured, to try costs nothing
         if (!over()) publish(false);
         // What one of them took tells what a finer one will.
         double sum = 0;
@@ -430,7 +226,7 @@ private:
     double finest() const
     {
         double spacing = HUGE_VAL;
-        for (const auto& r : runs_)
+        for (const auto& r : queue_->runs)
             if (r.part != Part::Member && r.finished()) spacing = std::min(spacing, r.spacing);
         return base_.layers_of(spacing);
     }
@@ -442,7 +238,7 @@ private:
             return not_finer(
                 {"the scene starts from the state of another run, whose spacing is given", "初期状態の粒子間隔が決まっているため"});
         if (layers_.given && layers_.finer == 0) return not_finer({"--layers asks for none", "--layers の指定により"});
-        const auto before = std::ranges::count_if(runs_, [](const Run& r) { return r.part == Part::Finer; });
+        const auto before = std::ranges::count_if(queue_->runs, [](const Run& r) { return r.part == Part::Finer; });
         if (layers_.given && before > 0) return false;
         auto& kept = plan_["finer_layers"]; // an earlier call's, perhaps with a checkpoint
         double layers = kept.is_array() && kept.size() > std::size_t(before) ? kept[std::size_t(before)].get<double>() : 0;
@@ -458,10 +254,10 @@ private:
         if (!kept.is_array()) kept = Json::array();
         if (kept.size() <= std::size_t(before)) kept.push_back(layers);
         keep_plan();
-        auto& r = add(Part::Finer, likely_member(base_.uncertain), spacing, fmt::format("finer-{:.3g}", base_.layers_of(spacing)));
+        auto& r = queue_->add(Part::Finer, likely_member(base_.uncertain), spacing, fmt::format("finer-{:.3g}", base_.layers_of(spacing)));
         const double expected = cost_.seconds(r.layers);
         say(fmt::format("finer: the likely values with {:.3g} layers, about {}", r.layers, seconds_text(expected)));
-        work({&r}, 1, cores_, layers_.given ? 0 : std::min(expected, 0.98 * left()));
+        queue_->work({&r}, 1, cores_, layers_.given ? 0 : std::min(expected, 0.98 * left()));
         if (!r.finished()) return false;
         cost_ = cost_of(r);
         if (!over()) publish(false);
@@ -479,7 +275,7 @@ private:
         if (!varied_ || args_.members > 0 || base_.uncertain.members > 0 || layers_.given) return false;
         double sum = 0, spacing = 0;
         int n = 0, last = 0;
-        for (const auto& r : runs_) {
+        for (const auto& r : queue_->runs) {
             if (r.part != Part::Member) continue;
             last = std::max(last, r.member.number), spacing = r.spacing;
             if (r.finished()) sum += r.seconds, ++n;
@@ -488,10 +284,10 @@ private:
         const auto all = draw_members(base_.uncertain, group_, last + group_);
         std::vector<Run*> todo;
         for (auto m = all.begin() + last; m != all.end(); ++m)
-            todo.push_back(&add(Part::Member, *m, spacing, fmt::format("members/{:03}", m->number)));
+            todo.push_back(&queue_->add(Part::Member, *m, spacing, fmt::format("members/{:03}", m->number)));
         say(fmt::format("more members: {} to {}", last + 1, last + group_));
         extra_from_ = extra_from_ > 0 ? extra_from_ : last + 1;
-        work(todo, jobs_, std::max(1, cores_ / jobs_), sum / n);
+        queue_->work(todo, jobs_, std::max(1, cores_ / jobs_), sum / n);
         return std::ranges::all_of(todo, [](const Run* r) { return r->status != Status::NotRun && r->status != Status::Stopped; });
     }
 
@@ -502,7 +298,7 @@ private:
         std::vector<Words> all;
         std::vector<int> waiting, failed;
         std::vector<std::string> why;
-        for (const auto& r : runs_) {
+        for (const auto& r : queue_->runs) {
             const bool waits = r.status == Status::NotRun || r.status == Status::Stopped;
             if (r.part == Part::Member) {
                 const bool extra = extra_from_ > 0 && r.member.number >= extra_from_;
@@ -529,16 +325,16 @@ private:
         if (!varied_)
             all.push_back({"no ensemble: the scene has no [uncertain], so the input's part in the uncertainty is unknown",
                            "アンサンブルなし: シーンに [uncertain] がないため、入力の不確かさは含まれていません"});
-        if (!finer_not_done_.en.empty() && std::ranges::none_of(runs_, [](const Run& r) { return r.part == Part::Finer; }))
+        if (!finer_not_done_.en.empty() && std::ranges::none_of(queue_->runs, [](const Run& r) { return r.part == Part::Finer; }))
             all.push_back({"no finer run: " + finer_not_done_.en, "より細かい計算なし: " + finer_not_done_.ja});
         return all;
     }
 
-    std::vector<Run> runs() const { return {runs_.begin(), runs_.end()}; }
+    std::vector<Run> runs() const { return {queue_->runs.begin(), queue_->runs.end()}; }
 
     void publish_now_and_then()
     {
-        const auto members = std::ranges::count_if(runs_, [](const Run& r) { return r.part == Part::Member && r.finished(); });
+        const auto members = std::ranges::count_if(queue_->runs, [](const Run& r) { return r.part == Part::Member && r.finished(); });
         if (members >= enough_members && now() - published_at_ > std::max(10.0, 20 * publish_seconds_) && !over()) publish(false);
     }
 
@@ -589,65 +385,6 @@ private:
         return stopped ? Exit::Stopped : Exit::Ok;
     }
 
-    // ---- --members-from
-
-    /// The maps of the runs that an answer lists, once more; runs nothing.
-    Exit from_members()
-    {
-        const io::Path file = args_.members_from, folder = std::filesystem::absolute(file).parent_path();
-        std::vector<Run> all;
-        double deadline = 0, ended = 0;
-        try {
-            std::string text;
-            try {
-                text = io::read_text(file);
-            } catch (const IoFailed& e) {
-                throw BadInput(e.what());
-            }
-            const auto j = Json::parse(text);
-            base_.coarsest = j.at("coarsest_spacing"), group_ = j.at("group");
-            deadline = j.at("deadline_seconds"), ended = j.at("ended_seconds");
-            for (const char* list : {"likely_runs", "members"})
-                for (const auto& m : j.at(list)) {
-                    Run r;
-                    const std::string part = m.at("part"), status = m.at("status");
-                    for (const Part p : {Part::Preliminary, Part::Likely, Part::Member, Part::Finer})
-                        if (part == word(p)) r.part = p;
-                    for (const Status s : {Status::NotRun, Status::Finished, Status::Failed, Status::Refused, Status::Stopped})
-                        if (status == word(s)) r.status = s;
-                    r.member.number = m.at("number"), r.layers = m.at("layers"), r.spacing = m.at("spacing");
-                    r.directory = m.at("directory").get<std::string>(), r.seconds = m.at("seconds");
-                    r.message = m.value("message", std::string());
-                    for (const auto& input : inputs_of(base_.uncertain)) r.member.values.push_back(m.at("settings").at(input.name));
-                    if (r.finished())
-                        r.maps = std::make_shared<const RunMaps>(
-                            read_maps(folder / r.directory, base_, maps_for(base_.scene, base_.coarsest).wet));
-                    all.push_back(std::move(r));
-                }
-        } catch (const Json::exception& e) {
-            throw BadInput(
-                fmt::format("{}: expected a hazard.json of this scene, found something else ({}). Remedy: the file of an earlier "
-                            "kuzure hazard",
-                            file.string(), e.what()));
-        }
-        if (std::ranges::none_of(all, &Run::finished)) throw BadInput(fmt::format("{}: expected finished runs, found none", file.string()));
-        std::error_code error;
-        if (!std::filesystem::equivalent(out_, folder, error) && std::filesystem::exists(out_, error) &&
-            !std::filesystem::is_empty(out_, error))
-            throw BadInput(
-                fmt::format("{}: expected a new directory, found one with other things in it; choose another with -o DIR", out_.string()));
-        std::filesystem::create_directories(out_, error);
-        owner_.emplace(io::hold(out_), complain);
-        Answer answer = answer_of(base_, all);
-        write_maps(base_, answer, points_, out_);
-        const State state{base_, args_.scene.file, all, deadline, ended, group_, true, {}, not_modelled(base_)};
-        io::write_atomically(out_ / "report.html", html(state, answer, out_));
-        if (!std::filesystem::equivalent(out_, folder, error))
-            io::write_atomically(out_ / "hazard.json", to_json(state, answer).dump(1) + "\n");
-        say(fmt::format("the answer of {} runs listed in {}: {}", answer.counted.size(), file.string(), (out_ / "report.html").string()));
-        return Exit::Ok;
-    }
-
     double began_;
     Arguments args_;
     double within_;
@@ -661,110 +398,12 @@ private:
     Cost cost_;
     Json plan_;
     Words finer_not_done_;
-    std::deque<Run> runs_; // runs are pointed at
+    std::optional<Queue> queue_;
     std::optional<io::Ownership> owner_;
     std::optional<study::StopRequest> stop_;
 };
 
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
-
 } // namespace
-
-std::vector<Words> not_modelled(const Base& base)
-{
-    const auto& s = base.scene;
-    const auto& u = base.uncertain;
-    std::vector<Words> all{
-        {"entrainment of soil on the way", "流下中の土砂の取り込み(侵食)"},
-        {"trees, houses and other obstacles that are not in the elevation model", "標高モデルにない樹木・家屋などの障害物"},
-        {"the time from the trigger to the start of motion", "発生のきっかけから動き出すまでの時間"}};
-    if (!s.effects.pore_pressure) all.push_back({"water in the soil", "土中の水"});
-    else all.push_back({"pore water that flows or is pressed by the motion", "間隙水の流れと過剰間隙水圧"});
-    if (!u.friction && !u.bed_friction) all.push_back({"uncertainty of friction", "摩擦の不確かさ"});
-    if (!u.thickness) all.push_back({"uncertainty of the volume", "崩壊土量の不確かさ"});
-    if (s.terrain && !u.dem_error) all.push_back({"errors of the elevation model", "標高モデルの誤差"});
-    return all;
-}
-
-Json to_json(const State& st, const Answer& a)
-{
-    const auto inputs = inputs_of(st.base.uncertain);
-    const auto run = [&](const Run& r) {
-        Json settings = Json::object();
-        for (std::size_t k = 0; k < inputs.size(); ++k) settings[inputs[k].name] = r.member.values[k];
-        Json j{{"directory", r.directory.string()},
-               {"part", word(r.part)},
-               {"number", r.member.number},
-               {"status", word(r.status)},
-               {"counted", std::ranges::find_if(a.counted, [&](const Run* c) { return c->directory == r.directory; }) != a.counted.end()},
-               {"settings", settings},
-               {"layers", r.layers},
-               {"spacing", r.spacing},
-               {"seconds", r.seconds},
-               {"reach", r.finished() ? Json(r.maps->reach) : Json()},
-               {"volume", r.finished() ? Json(r.maps->volume) : Json()}};
-        if (!r.message.empty()) j["message"] = r.message;
-        if (!r.notes.empty()) j["notes"] = r.notes;
-        return j;
-    };
-    Json members = Json::array(), likely = Json::array();
-    int finished = 0, failed = 0;
-    double layers = 0;
-    for (const auto& r : st.runs) {
-        (r.part == Part::Member ? members : likely).push_back(run(r));
-        if (r.part == Part::Member) finished += r.finished(), failed += r.status == Status::Failed || r.status == Status::Refused;
-        if (r.finished() && r.part != Part::Member) layers = std::max(layers, r.layers);
-    }
-    for (const auto* r : a.counted) layers = layers > 0 ? layers : r->layers;
-    Json inputs_json = Json::array();
-    for (const auto& i : inputs)
-        inputs_json.push_back(
-            {{"name", i.name}, {"unit", i.unit}, {"low", i.range.low}, {"likely", i.range.likely}, {"high", i.range.high}});
-    Json sensitivity = Json::array();
-    for (const auto& s : a.sensitivity)
-        sensitivity.push_back({{"input", s.input},
-                               {"rank_correlation", number(s.correlation)},
-                               {"interval", {number(s.interval[0]), number(s.interval[1])}}});
-    const auto english = [](const std::vector<Words>& lines) {
-        Json list = Json::array();
-        for (const auto& w : lines) list.push_back(w.en);
-        return list;
-    };
-    const auto maps = maps_for(st.base.scene, st.base.coarsest);
-    Json j{{"title", st.base.scene.title},
-           {"version", version_text()},
-           {"scene", st.scene_file},
-           {"scene_hash", io::scene_hash(st.base.scene)},
-           {"final", st.final},
-           {"preliminary", a.preliminary},
-           {"deadline_seconds", st.deadline},
-           {"ended_seconds", st.ended},
-           {"layers", layers},
-           {"reach", {{"low", a.low}, {"likely", a.likely}, {"high", a.high}}},
-           {"discretisation",
-            {{"half_width", number(a.discretisation.half_width)},
-             {"how", a.discretisation.how},
-             {"layers_and_reach", a.discretisation.samples}}},
-           {"volume", {{"low", a.volume[0]}, {"mean", a.volume[1]}, {"high", a.volume[2]}}},
-           {"area", {{"p05", a.area_05}, {"p50", a.area_50}, {"p95", a.area_95}}},
-           {"members_finished", finished},
-           {"members_failed", failed},
-           {"counted", a.counted.size()},
-           {"inputs", inputs_json},
-           {"seed", st.base.uncertain.seed},
-           {"group", st.group},
-           {"sensitivity", sensitivity},
-           {"cell", maps.cell},
-           {"wet", maps.wet},
-           {"coarsest_spacing", st.base.coarsest},
-           {"crs", st.base.scene.map_frame.crs.empty() ? Json() : Json(io::crs_name(st.base.scene.map_frame.crs))},
-           {"not_done", english(st.not_done)},
-           {"not_modelled", english(st.not_modelled)},
-           {"likely_runs", likely},
-           {"members", members}};
-    if (const auto& e = st.base.uncertain.dem_error) j["dem_error"] = {{"height", e->height}, {"length", e->length}};
-    return j;
-}
 
 Exit run_hazard(const Comm& comm, const Arguments& a) { return Hazard(comm, a).go(); }
 

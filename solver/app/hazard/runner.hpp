@@ -15,6 +15,9 @@ struct Arguments {
 /// Throws BadInput, IoFailed.
 Exit run_hazard(const Comm&, const Arguments&);
 
+/// --members-from: the answer of the runs that a hazard.json lists, into `out`; runs nothing. Throws BadInput, IoFailed.
+Exit answer_again(Base, const Arguments&, const std::vector<io::NamedPoint>&, const io::Path& out);
+
 /// Where an answer stands.
 struct State {
     const Base& base;

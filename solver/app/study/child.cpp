@@ -42,7 +42,7 @@ bool StopRequest::came() const { return stop_signal != 0; }
 
 ChildResult run_child(const std::vector<std::string>& arguments, const io::Path& log) { return *Child(arguments, log).ended(true); }
 
-Child::Child(const std::vector<std::string>& arguments, const io::Path& log)
+Child::Child(const std::vector<std::string>& arguments, const io::Path& log, bool gives_way)
 {
     if (!place_of(0)) throw IoFailed(fmt::format("starting kuzure run failed: {} run already", most_children));
     // The child starts MPI anew: what this process's MPI left in the environment is not for it.
@@ -55,6 +55,7 @@ Child::Child(const std::vector<std::string>& arguments, const io::Path& log)
             ours = ours || v.starts_with(head);
         if (!ours) kept.emplace_back(v);
     }
+    if (gives_way && !std::getenv("OMP_WAIT_POLICY") && !std::getenv("GOMP_SPINCOUNT")) kept.emplace_back("OMP_WAIT_POLICY=passive");
     std::vector<char*> env, argv;
     for (auto& e : kept) env.push_back(e.data());
     env.push_back(nullptr);

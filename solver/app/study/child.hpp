@@ -34,8 +34,9 @@ inline constexpr int most_children = 1024;
 class Child {
 public:
     /// Starts this very program with other arguments, output into `log`. A StopRequest must live. Throws IoFailed where it cannot be
-    /// started; at most `most_children` live.
-    Child(const std::vector<std::string>& arguments, const io::Path& log);
+    /// started; at most `most_children` live. One that gives way lets its threads sleep where they wait for one another: on cores that
+    /// others use as well, waiting awake is what takes the time.
+    Child(const std::vector<std::string>& arguments, const io::Path& log, bool gives_way = false);
     Child(Child&& o) noexcept : pid_(std::exchange(o.pid_, -1)) {}
     Child& operator=(Child&&) = delete;
     /// Kills it, where it still runs.
