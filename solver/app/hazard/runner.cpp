@@ -377,8 +377,9 @@ private:
                         answer.low, answer.high, answer.counted.size(), answer.discretisation.how));
         for (const auto& s : answer.sensitivity)
             if (std::isfinite(s.correlation))
-                say(fmt::format("  {:<16} rank correlation with the reach {:+.2f} ({:+.2f} to {:+.2f})", s.input, s.correlation,
-                                s.interval[0], s.interval[1]));
+                say(fmt::format("  {:<16} rank correlation with the reach {:+.2f} ({})", s.input, s.correlation,
+                                std::isfinite(s.interval[0]) ? fmt::format("{:+.2f} to {:+.2f}", s.interval[0], s.interval[1])
+                                                             : "too few members for an interval"));
         for (const auto& line : not_done()) say("  not done: " + line.en);
         say(fmt::format("{}after {} of {}: {}", stopped ? "stopped on request " : "", seconds_text(now()), seconds_text(within_),
                         (out_ / "report.html").string()));
