@@ -184,7 +184,9 @@ void draw_legend(Canvas& canvas, const MapPicture& m, const View& v, const Scale
     for (std::size_t k = 0; k < m.outlines.size(); ++k) {
         const double at = y + height + 30 + 26 * double(k);
         canvas.line(x, at, x + width, at, 2.4, outline_colors[k % outline_colors.size()]);
-        canvas.text(x + width + 11, at, 15, fmt::format("h_max {:g} m", m.outlines[k].limit), ink, Anchor::Left, right - 75);
+        const auto& o = m.outlines[k];
+        canvas.text(x + width + 11, at, 15, o.label.empty() ? fmt::format("h_max {:g} m", o.limit) : o.label, ink, Anchor::Left,
+                    right - 75);
     }
 }
 

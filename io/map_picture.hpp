@@ -14,8 +14,9 @@ struct MapPicture {
     struct Outline {
         double limit; // m
         std::vector<scene::Area> areas;
+        std::string label = {}; // in the legend; empty: h_max at the limit
     };
-    std::vector<Outline> outlines; // of h_max
+    std::vector<Outline> outlines;
 };
 
 /// The bytes of a PNG that shows where there are values, and some of what is around them. Throws BadInput where can_draw() is false.

@@ -5,6 +5,7 @@
 // A key is needed unless it has a fallback, is optional or is read into a std::optional.
 #include "io/scene_keys.hpp"
 #include "solver/scene/scene.hpp"
+#include "solver/scene/uncertain.hpp"
 #include <numbers>
 #include <string>
 
@@ -464,6 +465,62 @@ template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
                        .doc = "named points (.csv with the columns name, x, y; .shp; GeoJSON) of which points.csv tells arrival, greatest "
                               "thickness, "
                               "speed and pressure"});
+           });
+}
+
+/// What kuzure hazard varies; no part of a Scene, for a run takes the scene as it is written.
+template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>& uncertain)
+{
+    const Range friction = from_below(0, 90);
+    const auto triangle = [&](const std::string& path, std::optional<scene::Triangle>& to, const char* unit, Range range,
+                              const char* example, const char* doc) {
+        a.table(path, to, {.unit = unit, .example = example, .doc = doc}, [&](const std::string& p, scene::Triangle& t) {
+            a.number(p + ".low", t.low, {.unit = unit, .range = range, .example = "16.0", .doc = "least value"});
+            a.number(p + ".likely", t.likely, {.unit = unit, .range = range, .example = "20.0", .doc = "most likely value"});
+            a.number(p + ".high", t.high, {.unit = unit, .range = range, .example = "28.0", .doc = "greatest value"});
+        });
+    };
+    a.part("uncertain", uncertain,
+           {.example = "{ bed_friction = { low = 16.0, likely = 20.0, high = 28.0 } }",
+            .doc = "what is not known, for kuzure hazard: distributions are triangles from low over likely to high (docs/hazard.md)",
+            .role = Role::Bookkeeping},
+           [&](const std::string& p, scene::Uncertain& u) {
+               a.integer(p + ".seed", u.seed,
+                         {.range = between(0, 2147483647), .fallback = "1", .example = "7", .doc = "which members are drawn"});
+               a.integer(p + ".members", u.members,
+                         {.range = between(0, 10000),
+                          .fallback = "0",
+                          .example = "24",
+                          .doc = "runs of the ensemble; 0: as many as the time allows"});
+               triangle(p + ".friction", u.friction, "deg", friction, "{ low = 26.0, likely = 30.0, high = 34.0 }",
+                        "friction angle of every soil");
+               triangle(p + ".bed_friction", u.bed_friction, "deg", friction, "{ low = 16.0, likely = 20.0, high = 28.0 }",
+                        "Coulomb friction of the ground, and of every wall that has one");
+               triangle(p + ".thickness", u.thickness, "1", between(0.1, 10), "{ low = 0.65, likely = 1.0, high = 1.35 }",
+                        "factor on the thickness of releases and the height of other bodies, hence on the volume");
+               a.table(p + ".dem_error", u.dem_error,
+                       {.example = "{ height = 1.0, length = 50.0 }", .doc = "error of the elevation models, the same sort everywhere"},
+                       [&](const std::string& q, scene::HeightError& e) {
+                           a.number(q + ".height", e.height,
+                                    {.unit = "m", .range = above_to(0, 1000), .example = "1.0", .doc = "root mean square"});
+                           a.number(q + ".length", e.length,
+                                    {.unit = "m", .range = size, .example = "50.0", .doc = "over which errors are alike"});
+                       });
+               a.numbers(p + ".pressures", u.pressures,
+                         {.unit = "kPa",
+                          .range = above_to(0, 1e6),
+                          .fallback = "[3.0, 30.0]",
+                          .example = "[3.0, 30.0]",
+                          .doc = "dynamic pressures whose exceedance is mapped"});
+               a.tables(p + ".key", u.keys, {.optional = true, .example = "[[uncertain.key]]", .doc = "any other number of the scene"},
+                        [&](const std::string& q, scene::UncertainKey& k) {
+                            a.text(q + ".key", k.key, {.example = "\"soil.debris.cohesion\"", .doc = "its path"});
+                            const auto number = [&](const char* leaf, double& to, const char* doc) {
+                                a.number(q + leaf, to, {.unit = "of the key", .example = "1000.0", .doc = doc});
+                            };
+                            number(".low", k.value.low, "least value"), number(".likely", k.value.likely, "most likely value"),
+                                number(".high", k.value.high, "greatest value");
+                        });
            });
 }
 

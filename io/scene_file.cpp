@@ -185,7 +185,66 @@ private:
     Document& file_;
 };
 
+/// The rules of [uncertain] that no key has alone.
+void check_uncertain(Document& file, const scene::Uncertain& u)
+{
+    const auto triangle = [&](const std::string& path, const scene::Triangle& t) {
+        if (!(t.low <= t.likely && t.likely <= t.high))
+            file.complain(path, fmt::format("expected low <= likely <= high, found {:g}, {:g}, {:g}. Remedy: exchange them", t.low,
+                                            t.likely, t.high));
+        else if (t.low == t.high)
+            file.complain(path, fmt::format("expected low < high, found {:g} for both: nothing varies. Remedy: write what is certain "
+                                            "where it belongs, and leave it out here",
+                                            t.low));
+    };
+    if (u.friction) triangle("uncertain.friction", *u.friction);
+    if (u.bed_friction) triangle("uncertain.bed_friction", *u.bed_friction);
+    if (u.thickness) triangle("uncertain.thickness", *u.thickness);
+    if (u.dem_error && !file.find("terrain"))
+        file.complain("uncertain.dem_error", "expected [terrain] beside it, found none. Remedy: leave it out");
+    for (std::size_t k = 0; k < u.keys.size(); ++k) {
+        const auto& [key, value] = u.keys[k];
+        const auto path = fmt::format("uncertain.key.{}", k);
+        triangle(path, value);
+        const Key* row = key.starts_with("uncertain") ? nullptr : scene_keys().find(key);
+        if (!row || row->kind != Kind::Number || row->role != Role::Physics) {
+            file.complain(path + ".key", fmt::format("expected the path of a number that changes the physics, such as "
+                                                     "\"soil.sand.cohesion\" or \"body.0.release.thickness\", found \"{}\"",
+                                                     key));
+            continue;
+        }
+        if (!file.find(key.substr(0, key.rfind('.'))))
+            file.complain(path + ".key",
+                          fmt::format("this scene has no {}. Remedy: write it, or another path", key.substr(0, key.rfind('.'))));
+        for (const auto& [leaf, x] : {std::pair{".low", value.low}, std::pair{".high", value.high}})
+            if (!row->range.holds(x))
+                file.complain(path + leaf, fmt::format("expected a number with {} for {}, found {:g}", row->range.text(), key, x));
+    }
+    if (!u.friction && !u.bed_friction && !u.thickness && !u.dem_error && u.keys.empty())
+        file.complain("uncertain",
+                      "expected something that is uncertain: friction, bed_friction, thickness, dem_error or [[uncertain.key]]; "
+                      "found none. Remedy: bed_friction = { low = 16.0, likely = 20.0, high = 28.0 }, or leave the section out");
+}
+
+std::optional<scene::Uncertain> uncertain_of(Document& file)
+{
+    std::optional<scene::Uncertain> u;
+    Reader reader(file);
+    describe_uncertain(reader, u);
+    if (u) check_uncertain(file, *u);
+    file.throw_if_any();
+    return u;
+}
+
 } // namespace
+
+std::optional<scene::Uncertain> parse_uncertain(std::string_view text, const std::string& name, std::span<const std::string> sets)
+{
+    Document file(text, name, scene_keys(), sets);
+    apply_preset(file.root);
+    file.check();
+    return uncertain_of(file);
+}
 
 std::string read_scene_text(const std::filesystem::path& path) { return read_document_text(path, scene_keys().file()); }
 
@@ -205,6 +264,7 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
     Reader reader(file);
     describe(reader, scene);
     file.throw_if_any();
+    uncertain_of(file); // a run does without it, but not with a wrong one
     // Paths count from the scene file's directory.
     const auto absolute = [&](std::string& path) {
         if (!path.empty()) path = std::filesystem::absolute(std::filesystem::path(name).parent_path() / path).lexically_normal().string();

@@ -2,6 +2,7 @@
 // The scene file: TOML to a scene and back. What a scene may say stands in io/scene_description.hpp alone.
 #include "solver/scene/check.hpp"
 #include "solver/scene/scene.hpp"
+#include "solver/scene/uncertain.hpp"
 #include <filesystem>
 #include <span>
 #include <string>
@@ -22,10 +23,13 @@ Scene parse_scene(std::string_view text, const std::string& name, std::span<cons
 scene::CheckedScene parse_checked_scene(std::string_view text, const std::string& name, std::span<const std::string> sets,
                                         scene::StepLimit);
 
+/// What the text of a scene file says under [uncertain]; nothing where it has none. Throws BadInput as parse_scene() does.
+std::optional<scene::Uncertain> parse_uncertain(std::string_view text, const std::string& name, std::span<const std::string> sets = {});
+
 /// parse_scene of read_scene_text. Throws BadInput.
 Scene read_scene(const std::filesystem::path&, std::span<const std::string> sets = {}, scene::StepLimit = scene::StepLimit::Enforce);
 
-/// The scene as TOML with every default written out; it reads back to the same scene bit for bit.
+/// The scene as TOML with every default written out; it reads back to the same scene bit for bit. [uncertain] is no part of it.
 std::string write_scene(const Scene&);
 
 /// 16 hexadecimal digits of all that changes the physics: everything but title, time.end, soil names and [output].

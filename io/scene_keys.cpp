@@ -156,6 +156,8 @@ std::vector<Key> make_keys()
     Collector collector;
     Scene scene;
     describe(collector, scene);
+    std::optional<scene::Uncertain> uncertain;
+    describe_uncertain(collector, uncertain);
     auto& keys = collector.keys;
     const auto row = [&](std::string_view path) -> Key& {
         const auto found = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return k.path == path; });

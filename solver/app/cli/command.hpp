@@ -42,6 +42,7 @@ void add_report(CLI::App&, Action& chosen);
 void add_picture(CLI::App&, Action& chosen);
 void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
+void add_hazard(CLI::App&, Action& chosen);
 void add_terrain(CLI::App&, Action& chosen);
 void add_example(CLI::App&, Action& chosen);
 void add_surface(CLI::App&, Action& chosen);

@@ -1,6 +1,7 @@
 // kuzure check: what will be simulated and why, counts, step, memory, disk. Runs nothing.
 #include "solver/scene/check.hpp"
 #include "solver/app/cli/command.hpp"
+#include "solver/app/hazard/fits.hpp"
 #include "solver/app/report/scene_facts.hpp"
 #include "solver/app/run/maps.hpp"
 #include "solver/app/scaling/predict.hpp"
@@ -33,13 +34,16 @@ Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy
 struct Arguments {
     SceneArguments scene;
     bool json = false;
-    std::string machine, accuracy;
+    std::string machine, accuracy, within;
     int ranks = 0;
 };
 
 Exit print_facts(const Comm& comm, const Arguments& a)
 {
-    const auto [s, scene_warnings, filling] = a.scene.read(comm);
+    const auto checked = a.scene.read(comm);
+    const auto& [s, scene_warnings, filling] = checked;
+    const auto uncertain = io::parse_uncertain(io::read_scene_text(a.scene.file), a.scene.file, a.scene.sets);
+    if (!a.within.empty()) return hazard::print_what_fits(comm, checked, uncertain, {a.scene.file, a.within, a.machine, a.ranks, a.json});
     if (!a.accuracy.empty()) return turn_the_dial(comm, s, a.accuracy, a.json);
     const auto model = choose_model(s, Arithmetic::Simd);
     const Estimate e = estimate(s, filling, *model);
@@ -66,7 +70,13 @@ Exit print_facts(const Comm& comm, const Arguments& a)
         warnings.push_back("on this machine kuzure run would refuse this scene: " + why);
     if (comm.rank() != 0) return Exit::Ok;
     const SceneFacts facts{s, filling, e, model->name(), memory, time, where_text, warnings};
-    fmt::print("{}", a.json ? to_json(facts).dump(2) + "\n" : to_text(facts));
+    if (a.json) {
+        auto j = to_json(facts);
+        if (uncertain) j["uncertain"] = hazard::uncertain_json(*uncertain);
+        fmt::print("{}\n", j.dump(2));
+    } else {
+        fmt::print("{}{}", to_text(facts), uncertain ? "\n" + hazard::uncertain_text(*uncertain) : std::string());
+    }
     return Exit::Ok;
 }
 
@@ -84,6 +94,10 @@ void add_check(CLI::App& app, Action& chosen)
         ->add_option("--accuracy", a->accuracy,
                      "settings for this error, such as 5%, from the measured table, with time and expected error")
         ->type_name("ERROR");
+    command
+        ->add_option("--within", a->within,
+                     "what kuzure hazard could answer in this time, such as 30m: layers and members, here or on a --machine")
+        ->type_name("TIME");
     auto* profile =
         command->add_option("--machine", a->machine, "predict for a profile of jobs/machines, or the path of one")->type_name("NAME");
     command->add_option("--ranks", a->ranks, "ranks on that machine (default: one node full)")

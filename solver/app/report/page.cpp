@@ -2,6 +2,7 @@
 #include "io/quote.hpp"
 #include <algorithm>
 #include <cstdint>
+#include <fmt/format.h>
 
 namespace kuzure::report {
 
@@ -108,6 +109,17 @@ std::string data_uri(std::string_view mime_type, std::string_view in)
         for (std::size_t k = 0; k < 4; ++k) out += k <= n ? digits[v >> (18 - 6 * k) & 63] : '=';
     }
     return out;
+}
+
+std::string section(const char* id, const char* title, const std::string& body)
+{
+    return body.empty() ? std::string() : fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", id, title, body);
+}
+
+std::string card(const char* name, const std::string& value, const std::string& more)
+{
+    return fmt::format("<div><dt>{}</dt><dd>{}{}</dd></div>", name, escaped(value),
+                       more.empty() ? "" : "<small>" + escaped(more) + "</small>");
 }
 
 std::string page(std::string_view title, std::string_view body)

@@ -14,17 +14,6 @@ namespace {
 constexpr std::uint64_t largest_picture = std::uint64_t(64) << 20, largest_movie = std::uint64_t(512) << 20; // bytes, in a page
 constexpr std::size_t most_notes = 100;
 
-std::string section(const char* id, const char* title, const std::string& body)
-{
-    return body.empty() ? std::string() : fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", id, title, body);
-}
-
-std::string card(const char* name, const std::string& value, const std::string& more = {})
-{
-    return fmt::format("<div><dt>{}</dt><dd>{}{}</dd></div>", name, escaped(value),
-                       more.empty() ? "" : "<small>" + escaped(more) + "</small>");
-}
-
 /// What the run's coarser twins say of its answer; nothing without them.
 std::string error_bars(const Record& r)
 {

@@ -306,7 +306,7 @@ std::vector<io::MapPicture::Outline> Maps::outlines(const std::vector<MapCell>& 
     if (scene_.maps->limits.empty()) return all;
     auto thickness = cut_out(cells, record_.grid(), 0, [](const MapCell& c) { return c.memory.thickness; });
     thickness.x += scene_.map_frame.x, thickness.y += scene_.map_frame.y;
-    for (const double limit : scene_.maps->limits) all.push_back({limit, scene::areas_above(thickness, limit)});
+    for (const double limit : scene_.maps->limits) all.push_back({limit, scene::areas_above(thickness, limit), {}});
     return all;
 }
 
@@ -317,7 +317,7 @@ void Maps::write_outlines(const io::Place& folder, const std::vector<io::MapPict
         if (name.starts_with("outline_") &&
             std::ranges::none_of(outlines, [&](const auto& o) { return name.starts_with(fmt::format("outline_{}.", o.limit)); }))
             io::remove_file(folder / name);
-    for (const auto& [limit, areas] : outlines) {
+    for (const auto& [limit, areas, label] : outlines) {
         io::MapLayer layer{.kind = io::MapLayer::Polygons, .columns = {"limit_m", "area_m2"}, .features = {}, .crs = scene_.map_frame.crs};
         for (const auto& area : areas) {
             double sum = 0;

@@ -59,10 +59,9 @@ void thicken(scene::Shape& shape, const Scene& s, const Vector& soil)
 
 } // namespace
 
-Twin coarsened(const Scene& scene, int factor)
+Scene with_spacing(const Scene& scene, double factor, std::vector<std::string>& notes)
 {
-    Twin twin{factor, scene, 1, {}};
-    Scene& s = twin.scene;
+    Scene s = scene;
     const scene::Filling filling(scene);
     const double half = 0.5 * scene.space.spacing;
     const auto& bounds = filling.soil_bounds();
@@ -70,10 +69,6 @@ Twin coarsened(const Scene& scene, int factor)
     const Vector middle{0.5 * (bounds.low.x + bounds.high.x), 0.5 * (bounds.low.y + bounds.high.y), 0.5 * (bounds.low.z + bounds.high.z)};
     s.space.spacing *= factor;
     if (s.time.step) *s.time.step *= factor;
-    // Of a twin only the last state and the history count.
-    s.title += fmt::format(" ({} times the spacing)", factor);
-    s.output.directory.clear(), s.output.every.reset(), s.output.picture.reset();
-    s.output.fields = {"density"};
 
     Snap snap(s, corner);
     const auto snap_box = [&](scene::Shape& shape) {
@@ -95,8 +90,21 @@ Twin coarsened(const Scene& scene, int factor)
             else low -= s.space.spacing, high += s.space.spacing; // snapped bodies may stand out of it
         }
     if (bodies_moved > 1e-6 * s.space.spacing)
-        twin.notes.push_back(fmt::format("the bodies do not hold whole spacings of {:g} m: faces were moved by up to {:.3g} m",
-                                         s.space.spacing, bodies_moved));
+        notes.push_back(fmt::format("the bodies do not hold whole spacings of {:g} m: faces were moved by up to {:.3g} m", s.space.spacing,
+                                    bodies_moved));
+    return s;
+}
+
+Twin coarsened(const Scene& scene, int factor)
+{
+    Twin twin{factor, scene, 1, {}};
+    Scene& s = twin.scene;
+    const scene::Filling filling(scene);
+    s = with_spacing(scene, factor, twin.notes);
+    // Of a twin only the last state and the history count.
+    s.title += fmt::format(" ({} times the spacing)", factor);
+    s.output.directory.clear(), s.output.every.reset(), s.output.picture.reset();
+    s.output.fields = {"density"};
 
     scene::resolve(s);
     std::string errors;

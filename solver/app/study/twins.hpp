@@ -18,6 +18,9 @@ struct Twin {
     double soil_volume = 1;         // over that of the scene: 1 where its bodies hold whole spacings
     std::vector<std::string> notes; // what had to be changed, in words
 };
+/// The scene at `factor` times the spacing and, where it is fixed, the step: faces of boxes moved to the nearest whole spacing, walls at
+/// least a support thick, periods whole. Not checked; `notes` gets what had to be changed, in words.
+Scene with_spacing(const Scene&, double factor, std::vector<std::string>& notes);
 /// The scene at `factor` times the spacing and, where it is fixed, the step: faces of boxes moved to the nearest whole spacing,
 /// walls at least a support thick, periods whole. Throws BadInput where it cannot be filled.
 Twin coarsened(const Scene&, int factor);

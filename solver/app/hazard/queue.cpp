@@ -1,0 +1,208 @@
+#include "solver/app/hazard/queue.hpp"
+#include "io/owner.hpp"
+#include "solver/core/wall_clock.hpp"
+#include <algorithm>
+#include <chrono>
+#include <fmt/format.h>
+#include <list>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+namespace kuzure::hazard {
+namespace {
+
+/// The last line that a child said.
+std::string last_words(const io::Path& log)
+{
+    std::string text;
+    try {
+        text = io::read_text(log);
+    } catch (const IoFailed& e) {
+        return e.what();
+    }
+    while (!text.empty() && text.back() == '\n') text.pop_back();
+    text = text.substr(text.rfind('\n') + 1);
+    return text.starts_with("kuzure: ") ? text.substr(8) : text;
+}
+
+/// The name of a run as one of a file.
+std::string flat(const Run& r)
+{
+    std::string name = r.directory.string();
+    std::replace(name.begin(), name.end(), '/', '-');
+    return name;
+}
+
+} // namespace
+
+void say(const std::string& text)
+{
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+}
+
+std::string seconds_text(double s) { return s < 100 ? fmt::format("{:.1f} s", s) : fmt::format("{:.1f} min", s / 60); }
+
+Run& Queue::add(Part part, Member m, double spacing, const std::string& name)
+{
+    auto& r = runs.emplace_back();
+    r.part = part, r.member = std::move(m), r.spacing = spacing, r.layers = base_.layers_of(spacing), r.directory = name;
+    return r;
+}
+/// A run's scene on the disk; whether that is the one that was there before.
+bool Queue::prepare(Run& r, RunScene& scene) const
+{
+    const std::string name = flat(r), title = r.part == Part::Member ? fmt::format("member {}", r.member.number) : word(r.part);
+    scene = run_scene(base_, r.spacing, r.member, title, out_ / "inputs" / name);
+    r.notes = scene.notes;
+    std::string text = scene.text;
+    for (const auto& s : scene.sets) text = fmt::format("# with {}\n", s) + text;
+    const io::Path file = out_ / "scenes" / (name + ".toml");
+    std::error_code error;
+    const bool same = std::filesystem::exists(file, error) && io::read_text(file) == text;
+    if (!same) {
+        std::filesystem::remove_all(out_ / r.directory, error);
+        io::write_atomically(file, text);
+    }
+    return same;
+}
+
+/// What is left of an earlier call: takes what is finished, waits for a run that is still ending.
+void Queue::take_what_is_there(Run& r) const
+{
+    const io::Path where = out_ / r.directory;
+    std::error_code error;
+    if (!std::filesystem::is_directory(where, error)) return;
+    for (int k = 0; k < 100; ++k) {
+        try {
+            io::Ownership::refuse_if_owned(io::hold(where));
+            break;
+        } catch (const BadInput&) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(200));
+        }
+    }
+    try {
+        const auto j = nlohmann::json::parse(io::read_text(where / "summary.json"));
+        if (j.at("status") == "finished") {
+            r.seconds = j.value("wall_seconds", 0.0);
+            finish(r);
+        } else if (j.at("status") == "numbers failed") {
+            r.status = Status::Failed, r.message = j.value("message", std::string());
+        }
+    } catch (const std::exception&) { // not ended, or not whole: it is run again
+        r.status = Status::NotRun;
+    }
+    // Without a checkpoint it begins anew, and kuzure would move aside what it had begun.
+    if (r.status == Status::NotRun && !std::filesystem::exists(where / "checkpoint.h5", error) &&
+        !std::filesystem::exists(where / "checkpoint.prev.h5", error))
+        std::filesystem::remove_all(where, error);
+}
+
+void Queue::finish(Run& r) const
+{
+    r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_for(base_.scene, base_.coarsest).wet));
+    r.status = Status::Finished;
+    // Only the results count: a checkpoint of each of many runs would fill the disk.
+    std::error_code error;
+    for (const char* name : {"checkpoint.h5", "checkpoint.prev.h5"}) std::filesystem::remove(out_ / r.directory / name, error);
+}
+
+void Queue::work(std::vector<Run*> todo, int jobs, int threads, double expected)
+{
+    std::list<Running> running;
+    std::size_t next = 0;
+    double sum = 0;
+    int measured = 0;
+    bool stopping = false;
+    double stop_began = 0;
+    while (next < todo.size() || !running.empty()) {
+        while (!over() && next < todo.size() && int(running.size()) < jobs) {
+            if (measured > 0) expected = sum / measured;
+            if (expected > left_()) break;
+            Run& r = *todo[next++];
+            if (r.status != Status::NotRun && r.status != Status::Stopped) continue;
+            if (auto started = start(r, threads)) running.push_back(std::move(*started));
+        }
+        if (running.empty()) break;
+        for (auto at = running.begin(); at != running.end();) {
+            const auto ended = at->child.ended();
+            if (!ended) {
+                ++at;
+                continue;
+            }
+            at->run->seconds += wall_clock() - at->began;
+            conclude(*at->run, *ended);
+            if (at->run->finished()) sum += at->run->seconds, ++measured;
+            at = running.erase(at);
+            after_each_();
+        }
+        if (over() && !stopping) {
+            stopping = true, stop_began = wall_clock();
+            for (auto& r : running) r.child.send(SIGTERM);
+        }
+        if (stopping && wall_clock() - stop_began > std::max(2.0, 0.03 * within_))
+            for (auto& r : running) r.child.send(SIGKILL);
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+}
+
+std::optional<Queue::Running> Queue::start(Run& r, int threads) const
+{
+    RunScene scene;
+    try {
+        const bool same = prepare(r, scene);
+        if (same) take_what_is_there(r);
+    } catch (const BadInput& e) {
+        r.status = Status::Refused, r.message = e.what();
+        return std::nullopt;
+    }
+    if (r.status == Status::Finished || r.status == Status::Failed) {
+        say(fmt::format("  {}: there already, {}", r.directory.string(), word(r.status)));
+        return std::nullopt;
+    }
+    const std::string name = flat(r);
+    std::vector<std::string> words{"run",
+                                   (out_ / "scenes" / (name + ".toml")).string(),
+                                   "-o",
+                                   (out_ / r.directory).string(),
+                                   "--restart",
+                                   "--threads",
+                                   std::to_string(threads),
+                                   "--quiet"};
+    for (const auto& s : scene.sets) words.insert(words.end(), {"--set", s});
+    return Running{study::Child(words, out_ / "logs" / (name + ".txt"), true), &r, wall_clock()};
+}
+
+void Queue::conclude(Run& r, const study::ChildResult& ended) const
+{
+    const io::Path log = out_ / "logs" / (flat(r) + ".txt");
+    switch (ended.exit_code) {
+    case 0:
+        try {
+            finish(r);
+        } catch (const BadInput& e) {
+            r.status = Status::Failed, r.message = e.what();
+        } catch (const IoFailed& e) {
+            r.status = Status::Failed, r.message = e.what();
+        }
+        break;
+    case 2:
+        r.status = Status::Refused, r.message = last_words(log);
+        break;
+    case 5:
+    case 128 + SIGTERM:
+    case 128 + SIGINT:
+    case 128 + SIGKILL:
+        r.status = Status::Stopped;
+        break;
+    default:
+        r.status = Status::Failed, r.message = ended.exit_code == 3 || ended.exit_code == 4
+                                                   ? last_words(log)
+                                                   : fmt::format("ended with exit code {}", ended.exit_code);
+    }
+    if (r.finished())
+        say(fmt::format("  {}: {:.3g} layers, reach {:.4g} m, {}", r.directory.string(), r.layers, r.maps->reach, seconds_text(r.seconds)));
+    else say(fmt::format("  {}: {}{}", r.directory.string(), word(r.status), r.message.empty() ? "" : ": " + r.message));
+}
+
+} // namespace kuzure::hazard
