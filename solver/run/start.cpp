@@ -19,6 +19,13 @@ void place(const Scene& scene, std::span<const Material> soils, Particles& p, In
 
 } // namespace
 
+std::vector<Material> materials_of(const Scene& scene)
+{
+    std::vector<Material> m;
+    for (const auto& s : scene.soils) m.push_back(Material::from(s));
+    return m;
+}
+
 Vector start_velocity(const Scene& scene, const scene::Body& body)
 {
     Vector v = body.velocity;

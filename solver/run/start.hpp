@@ -11,6 +11,9 @@ namespace kuzure {
 /// Fills this rank's blocks with the scene's soil, with its velocities and initial stresses. Collective. The fields are required.
 void fill_start(const Comm&, Domain&, const Scene&, const scene::Filling&, std::span<const Material>, Particles&);
 
+/// The numbers of all soils of a scene.
+std::vector<Material> materials_of(const Scene&);
+
 /// Velocity with which a body starts, m/s; none along y in 2-D.
 Vector start_velocity(const Scene&, const scene::Body&);
 

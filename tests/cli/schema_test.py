@@ -53,8 +53,9 @@ def main():
     for line in (ROOT / "docs/scene.md").read_text().splitlines():
         if line.startswith("## "):
             section = re.sub(r"[\[\]`]", "", line[3:]).replace("Top level", "").replace("soil.<name>", "soil.*")
-            if section in ("body", "wall"):
+            if section in ("body", "wall", "event", "probe"):
                 section += ".*"
+            section = section.replace("event.soil", "event.*.soil")
         row = re.match(r"\| `([^`]+)` \| .* \| .* \| (.*) \| .* \| (.*) \|$", line)
         if not row:
             continue
