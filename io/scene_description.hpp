@@ -472,12 +472,16 @@ template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
 template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>& uncertain)
 {
     const Range friction = from_below(0, 90);
-    const auto triangle = [&](const std::string& path, std::optional<scene::Triangle>& to, const char* unit, Range range,
-                              const char* example, const char* doc) {
-        a.table(path, to, {.unit = unit, .example = example, .doc = doc}, [&](const std::string& p, scene::Triangle& t) {
-            a.number(p + ".low", t.low, {.unit = unit, .range = range, .example = "16.0", .doc = "least value"});
-            a.number(p + ".likely", t.likely, {.unit = unit, .range = range, .example = "20.0", .doc = "most likely value"});
-            a.number(p + ".high", t.high, {.unit = unit, .range = range, .example = "28.0", .doc = "greatest value"});
+    struct Example {
+        const char *low, *likely, *high;
+    };
+    const auto triangle = [&](const std::string& path, std::optional<scene::Triangle>& to, const char* unit, Range range, Example e,
+                              const char* doc) {
+        const std::string whole = std::string("{ low = ") + e.low + ", likely = " + e.likely + ", high = " + e.high + " }";
+        a.table(path, to, {.unit = unit, .example = whole.c_str(), .doc = doc}, [&](const std::string& p, scene::Triangle& t) {
+            a.number(p + ".low", t.low, {.unit = unit, .range = range, .example = e.low, .doc = "least value"});
+            a.number(p + ".likely", t.likely, {.unit = unit, .range = range, .example = e.likely, .doc = "most likely value"});
+            a.number(p + ".high", t.high, {.unit = unit, .range = range, .example = e.high, .doc = "greatest value"});
         });
     };
     a.part("uncertain", uncertain,
@@ -492,11 +496,10 @@ template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>
                           .fallback = "0",
                           .example = "24",
                           .doc = "runs of the ensemble; 0: as many as the time allows"});
-               triangle(p + ".friction", u.friction, "deg", friction, "{ low = 26.0, likely = 30.0, high = 34.0 }",
-                        "friction angle of every soil");
-               triangle(p + ".bed_friction", u.bed_friction, "deg", friction, "{ low = 16.0, likely = 20.0, high = 28.0 }",
+               triangle(p + ".friction", u.friction, "deg", friction, {"26.0", "30.0", "34.0"}, "friction angle of every soil");
+               triangle(p + ".bed_friction", u.bed_friction, "deg", friction, {"16.0", "20.0", "28.0"},
                         "Coulomb friction of the ground, and of every wall that has one");
-               triangle(p + ".thickness", u.thickness, "1", between(0.1, 10), "{ low = 0.65, likely = 1.0, high = 1.35 }",
+               triangle(p + ".thickness", u.thickness, "1", between(0.1, 10), {"0.65", "1.0", "1.35"},
                         "factor on the thickness of releases and the height of other bodies, hence on the volume");
                a.table(p + ".dem_error", u.dem_error,
                        {.example = "{ height = 1.0, length = 50.0 }", .doc = "error of the elevation models, the same sort everywhere"},

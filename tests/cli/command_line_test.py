@@ -104,7 +104,7 @@ def main():
     keys("gravty = [0.0, 0.0, -9.81]", 'did you mean "gravity"?')
     keys("rain = 20.0", "Rain and infiltration are not simulated", "effects.pore_pressure", silent_of=["did you mean"])
     keys("vegetation = true", "Plants are not simulated", silent_of=["did you mean"])
-    keys("earthquake = 0.2", "Shaking ground is not simulated", silent_of=["did you mean"])
+    keys("earthquake = 0.2", "Shaking ground is an event: [[event]] shaking", silent_of=["did you mean"])
     keys("qwertz = 1", "Known here", silent_of=["did you mean"])
     keys("cfl = 1.0", 'did you mean "accuracy.cfl"?')
     # ---- --set: the word that is wrong, not the file

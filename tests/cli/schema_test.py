@@ -55,7 +55,7 @@ def main():
             section = re.sub(r"[\[\]`]", "", line[3:]).replace("Top level", "").replace("soil.<name>", "soil.*")
             if section in ("body", "wall", "event", "probe"):
                 section += ".*"
-            section = section.replace("event.soil", "event.*.soil")
+            section = section.replace("event.soil", "event.*.soil").replace("uncertain.key", "uncertain.key.*")
         row = re.match(r"\| `([^`]+)` \| .* \| .* \| (.*) \| .* \| (.*) \|$", line)
         if not row:
             continue

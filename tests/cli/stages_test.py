@@ -143,9 +143,7 @@ body = "block"
 """
 
 
-def block(
-    end=0.5, cohesion=0.0, width=1.0, body="", wall="", gravity="[0.0, 0.0, -9.81]", effects="", history=0.01, space="", more=""
-):
+def block(end=0.5, cohesion=0.0, width=1.0, body="", wall="", gravity="[0.0, 0.0, -9.81]", effects="", history=0.01, space="", more=""):
     return BLOCK.format(**locals())
 
 
@@ -203,7 +201,10 @@ def excavation():
     path = scene("excavation", EXCAVATION + STAGES)
     notes = json.loads(subprocess.run([program, "check", path, "--json"], capture_output=True, text=True, check=True).stdout)
     events = [n["why"] for n in notes["effects"]["on"] if n["name"] == "event"]
-    check(len(events) == 6 and events[1] == "at t = 0.25 s: body cut 2 is removed; wall strut is added", f"check tells the events: {events[1]}")
+    check(
+        len(events) == 6 and events[1] == "at t = 0.25 s: body cut 2 is removed; wall strut is added",
+        f"check tells the events: {events[1]}",
+    )
     out = run(path, "one").stdout
     check("t = 0.1 s, event 0: body cut 1 is removed" in out, "the run says what happens")
     one = summary("one")
@@ -340,12 +341,17 @@ def slope():
     ).replace("low = [-4.0, 0.0, -0.4], high = [8.0, 0.0, 0.0]", "low = [0.0, 0.0, -0.4], high = [1.0, 0.0, 0.0]")
     run(scene("slope", text), "slope")
     # the speed grows as the square of the time since: its root as the time
-    points = [(r["time"], math.sqrt(r["velocity_x"])) for r in table("slope", "probes.csv") if r["time"] > 1.5 and 0.1 < r["velocity_x"] < 0.5]
+    points = [
+        (r["time"], math.sqrt(r["velocity_x"])) for r in table("slope", "probes.csv") if r["time"] > 1.5 and 0.1 < r["velocity_x"] < 0.5
+    ]
     n, st, ss = len(points), sum(p[0] for p in points), sum(p[1] for p in points)
     slope = (n * sum(a * b for a, b in points) - st * ss) / (n * sum(a * a for a, _ in points) - st * st)
     begin = st / n - ss / n / slope
     k, expected = most * (begin - 1) / rise, math.tan(phi - beta)
-    check(abs(k / expected - 1) < 0.1, f"critical acceleration {k:.4f} g against tan(phi - beta) = {expected:.4f}: {100 * (k / expected - 1):+.1f} %")
+    check(
+        abs(k / expected - 1) < 0.1,
+        f"critical acceleration {k:.4f} g against tan(phi - beta) = {expected:.4f}: {100 * (k / expected - 1):+.1f} %",
+    )
 
 
 def refused():
@@ -363,7 +369,10 @@ def refused():
         "slow removal": (event('from = 0.1\nto = 0.2\nremove = "floor"'), "happens at once"),
         "gone twice": (two('at = 0.1\nremove = "cut 1"', 'at = 0.2\nremove = "cut 1"'), "gone already"),
         "there already": (two('at = 0.1\nremove = "left"', 'at = 0.1\nadd = "left"'), "one event at a time"),
-        "both at once": (two("at = 0.1\ngravity = [0.0, 0.0, -1.0]", "from = 0.05\nto = 0.2\ngravity = [0.0, 0.0, -2.0]"), "one event at a time"),
+        "both at once": (
+            two("at = 0.1\ngravity = [0.0, 0.0, -1.0]", "from = 0.05\nto = 0.2\ngravity = [0.0, 0.0, -2.0]"),
+            "one event at a time",
+        ),
         "strength and cohesion": (event("at = 0.1\n[event.soil.clay]\nstrength = 0.5\ncohesion = 1.0"), "expected strength or its parts"),
         "no strength left": (event("at = 0.1\n[event.soil.clay]\ncohesion = 0.0\nfriction_angle = 0.0"), "a soil with strength"),
         "no water": (event("at = 0.1\nwater = [[0.0, 1.0]]"), "expected a scene with still water"),

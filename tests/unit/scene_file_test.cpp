@@ -192,9 +192,11 @@ TEST(SceneFile, EveryJobIsReadWithoutAWarning)
         if (entry.path().extension() == ".toml") {
             const auto scene = io::read_scene(entry.path());
             // The paper's larger cubes are as soft as its small one: that they are warned of is right.
+            // That a tall column runs too far is what the scene of one is there to show.
+            const bool tall = entry.path().stem() == "column";
             const bool large = entry.path().stem() == "hirata_104" || entry.path().stem() == "hirata_208";
             for (const auto& issue : scene::check(scene))
-                if (!large || (issue.key != "base_strain" && issue.key != "mach"))
+                if ((!large || (issue.key != "base_strain" && issue.key != "mach")) && !(tall && issue.key == "slenderness"))
                     ADD_FAILURE() << entry.path() << ": " << issue.key << ": " << issue.text;
         }
 }
@@ -447,6 +449,7 @@ TEST(SceneKeys, EveryWordOfAChoiceIsWrittenAsItWasRead)
     for (const auto& key : io::scene_keys()) {
         if (key.kind != io::Kind::Choice && key.kind != io::Kind::ChoiceOrTable) continue;
         if (key.path.starts_with("terrain.")) continue; // needs files: tests/cli/terrain_test.py
+        if (key.path.starts_with("event.")) continue;   // needs a time beside it: tests/cli/stages_test.py
         auto path = key.path;
         if (const auto star = path.find('*'); star != path.npos) path.replace(star, 1, path.starts_with("soil") ? "sand" : "0");
         std::set<std::string> hashes;
