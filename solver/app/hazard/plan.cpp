@@ -9,7 +9,7 @@
 namespace kuzure::hazard {
 namespace {
 
-constexpr double for_the_ensemble = 0.6, for_a_finer_run = 0.85; // shares of the time that is left then
+constexpr double for_the_ensemble = 0.6, for_a_finer_run = 0.6; // shares of the time that is left then
 
 /// Layers of runs that take so long, s.
 double layers_for(const Cost& c, double seconds)
