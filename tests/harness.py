@@ -5,6 +5,7 @@ A test in a folder below puts this one on its path:
     sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 """
 import atexit
+import hashlib
 import os
 import shutil
 import sys
@@ -39,6 +40,17 @@ def scratch(name):
     directory = tempfile.mkdtemp(prefix=f"kuzure-{name}-")
     atexit.register(shutil.rmtree, directory, ignore_errors=True)
     return directory
+
+
+def digest(where, files):
+    """SHA-256 by name of the files of a directory that `files` names, and of all in its maps/."""
+    found = {}
+    for folder in ("", "maps"):
+        for name in sorted(os.listdir(os.path.join(where, folder))):
+            if folder or name in files:
+                with open(os.path.join(where, folder, name), "rb") as f:
+                    found[name] = hashlib.sha256(f.read()).hexdigest()
+    return found
 
 
 def vector(v):

@@ -48,7 +48,6 @@ public:
 
 private:
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
-
     void check_keys()
     {
         need_terrain("terrain");

@@ -1,5 +1,6 @@
 #include "solver/run/energy.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/core/mix.hpp"
 #include <bit>
 #include <cmath>
 #include <fmt/format.h>
@@ -72,16 +73,6 @@ double Ledger::sum() const
     for_each_member(dissipated, dissipated, [&](double e, double) { all += e; });
     return all;
 }
-
-namespace {
-/// Finalizer of splitmix64.
-constexpr std::uint64_t mix(std::uint64_t z)
-{
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return z ^ (z >> 31);
-}
-} // namespace
 
 std::string state_hash(const Team& team, const Particles& p)
 {

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
 """kuzure hazard: the same bytes for any --jobs, order and number of kills, what a failing member costs, what is refused, what check says."""
 import csv
-import hashlib
 import json
 import os
 import random
@@ -12,6 +11,7 @@ import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+import harness
 from harness import check, finish, program, root, scratch
 
 work = scratch("hazard")
@@ -64,14 +64,7 @@ def call(*args, expect=0):
 
 def digest(directory):
     """What does not tell times: maps and the table of points."""
-    found = {}
-    for folder in ("maps", ""):
-        where = os.path.join(work, directory, folder)
-        for name in sorted(os.listdir(where)):
-            if folder or name == "points.csv":
-                with open(os.path.join(where, name), "rb") as f:
-                    found[name] = hashlib.sha256(f.read()).hexdigest()
-    return found
+    return harness.digest(os.path.join(work, directory), ("points.csv",))
 
 
 def answer(directory):

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
 """Maps ([maps]): the same bytes of every file on any ranks and threads and through a stop, volume kept, what GDAL reads, what is refused."""
 import csv
-import hashlib
 import json
 import math
 import os
@@ -13,6 +12,7 @@ import tempfile
 import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+import harness
 from harness import check, failures, finish, program
 
 work = tempfile.mkdtemp(prefix="kuzure-maps-")
@@ -67,14 +67,7 @@ def call(*args, expect=0, ranks=0):
 
 def digest(directory):
     """Every file that maps leave, by name."""
-    found = {}
-    for folder in ("", "maps"):
-        where = os.path.join(work, directory, folder)
-        for name in sorted(os.listdir(where)):
-            if folder == "maps" or name in ("front.csv", "points.csv"):
-                with open(os.path.join(where, name), "rb") as f:
-                    found[name] = hashlib.sha256(f.read()).hexdigest()
-    return found
+    return harness.digest(os.path.join(work, directory), ("front.csv", "points.csv"))
 
 
 def summary(directory):

@@ -6,6 +6,8 @@
 
 namespace kuzure::validation {
 
+inline double radians(double degrees) { return degrees * pi / 180; }
+
 /// Heights z(x, y) on square cells that cover low .. high (m).
 template <class Height> scene::Grid heights(Height z, std::array<double, 2> low, std::array<double, 2> high, double cell)
 {

@@ -9,8 +9,6 @@ using namespace kuzure::validation;
 
 namespace {
 
-double radians(double degrees) { return degrees * pi / 180; }
-
 GroundScene sand(double spacing)
 {
     GroundScene g;

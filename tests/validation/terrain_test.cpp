@@ -8,8 +8,6 @@ using namespace kuzure::validation;
 
 namespace {
 
-double radians(double degrees) { return degrees * pi / 180; }
-
 /// A cohesive block, four layers thick, on a plane that falls along `turn` (deg from x).
 GroundScene block(double slope, double delta, double turn = 0, double cell = 1)
 {

@@ -3,6 +3,7 @@
 #include "io/ground/raster.hpp"
 #include "io/ground/vectors.hpp"
 #include "solver/app/study/convergence.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/ring.hpp"
 #include <algorithm>
 #include <cmath>
@@ -110,21 +111,30 @@ io::Raster raster_of(const scene::MapGrid& g, const std::string& crs, std::vecto
             crs};
 }
 
-/// The box around what has a number.
-scene::Grid cut_out(const scene::Grid& g)
+/// The cells around what has a number: first column and row, and how many.
+struct Extent {
+    int column = 0, row = 0, columns = 0, rows = 0;
+};
+Extent extent_of(const scene::Grid& g)
 {
     int low_i = g.columns, low_j = g.rows, high_i = -1, high_j = -1;
     g.for_each([&](int i, int j, std::size_t k) {
         if (std::isnan(g.values[k])) return;
         low_i = std::min(low_i, i), high_i = std::max(high_i, i), low_j = std::min(low_j, j), high_j = std::max(high_j, j);
     });
+    if (high_i < 0) return {};
+    return {low_i, low_j, high_i - low_i + 1, high_j - low_j + 1};
+}
+scene::Grid cut_out(const scene::Grid& g, Extent e)
+{
     scene::Grid out;
-    if (high_i < 0) return out;
-    out.x = g.x_of(low_i), out.y = g.y_of(low_j), out.cell = g.cell, out.columns = high_i - low_i + 1, out.rows = high_j - low_j + 1;
-    for (int j = low_j; j <= high_j; ++j)
-        for (int i = low_i; i <= high_i; ++i) out.values.push_back(g.at(i, j));
+    if (e.columns == 0) return out;
+    out.x = g.x_of(e.column), out.y = g.y_of(e.row), out.cell = g.cell, out.columns = e.columns, out.rows = e.rows;
+    for (int j = e.row; j < e.row + e.rows; ++j)
+        for (int i = e.column; i < e.column + e.columns; ++i) out.values.push_back(g.at(i, j));
     return out;
 }
+scene::Grid cut_out(const scene::Grid& g) { return cut_out(g, extent_of(g)); }
 
 double area_of(const std::vector<scene::Area>& areas)
 {
@@ -186,22 +196,17 @@ RunMaps read_maps(const io::Path& run, const Base& base, double wet)
             fmt::format("{}: its maps do not lie on one grid. Remedy: remove this directory and run the hazard again", run.string()));
     RunMaps m;
     m.grid = grid_of(h);
-    int low_i = h.columns, low_j = h.rows, high_i = -1, high_j = -1;
-    h.for_each([&](int i, int j, std::size_t k) {
-        if (!std::isnan(end.values[k])) m.volume += end.values[k] * h.cell * h.cell;
-        if (std::isnan(h.values[k])) return;
-        low_i = std::min(low_i, i), high_i = std::max(high_i, i), low_j = std::min(low_j, j), high_j = std::max(high_j, j);
-    });
-    if (high_i < 0) return m;
-    m.column = low_i, m.row = low_j, m.columns = high_i - low_i + 1, m.rows = high_j - low_j + 1;
-    scene::Grid thickness; // where it counts as reached, for the outline
-    thickness.x = h.x_of(low_i), thickness.y = h.y_of(low_j), thickness.cell = h.cell, thickness.columns = int(m.columns),
-    thickness.rows = int(m.rows);
-    for (int j = low_j; j <= high_j; ++j)
-        for (int i = low_i; i <= high_i; ++i) {
-            m.thickness.push_back(float(h.at(i, j))), m.pressure.push_back(float(p.at(i, j))), m.arrival.push_back(float(a.at(i, j)));
-            thickness.values.push_back(h.at(i, j));
-        }
+    for (const double v : end.values)
+        if (!std::isnan(v)) m.volume += v * h.cell * h.cell;
+    const Extent e = extent_of(h);
+    m.column = e.column, m.row = e.row, m.columns = e.columns, m.rows = e.rows;
+    const auto kept = [&](const scene::Grid& g) {
+        const auto values = cut_out(g, e).values;
+        return std::vector<float>(values.begin(), values.end());
+    };
+    m.thickness = kept(h), m.pressure = kept(p), m.arrival = kept(a);
+    const scene::Grid thickness = cut_out(h, e); // where it counts as reached, for the outline
+    if (e.columns == 0) return m;
     const double x = base.scene.map_frame.x + base.centre.x, y = base.scene.map_frame.y + base.centre.y;
     for (const auto& area : scene::areas_above(thickness, wet * (1 - 1e-6)))
         for (const auto& ring : area)
@@ -354,9 +359,7 @@ void write_maps(const Base& base, Answer& answer, const std::vector<io::NamedPoi
         if (!crs.empty()) io::write_lightly(folder / (name + ".geojson"), geojson(outlines.back().areas, crs, percent / 100.0));
     }
     if (io::can_draw()) {
-        const scene::HeightField* ground = nullptr;
-        for (const auto& wall : base.scene.walls)
-            if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) ground = g->field.get();
+        const scene::HeightField* ground = scene::ground_of(base.scene);
         for (const auto which : {reach, arrival + 1, thickness + 2}) {
             const auto& l = layers[which];
             io::MapPicture picture{l.kind, base.scene.title, cut_out(raster_of(grid, crs, l.values).grid), {}, outlines};

@@ -3,21 +3,17 @@
 #include "io/ground/ground.hpp"
 #include "io/ground/vectors.hpp"
 #include "solver/app/study/twins.hpp"
+#include "solver/core/mix.hpp"
+#include "solver/scene/ground.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <numbers>
 
 namespace kuzure::hazard {
 namespace {
 
-constexpr double radians = 3.14159265358979323846 / 180;
-
-const scene::HeightField* ground_of(const Scene& s)
-{
-    for (const auto& wall : s.walls)
-        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) return g->field.get();
-    return nullptr;
-}
+constexpr double radians = std::numbers::pi / 180;
 
 io::Mosaic elevation(const Scene& s) { return {std::vector<io::Path>(s.terrain->dem.begin(), s.terrain->dem.end()), s.map_frame.crs}; }
 
@@ -25,7 +21,7 @@ io::Mosaic elevation(const Scene& s) { return {std::vector<io::Path>(s.terrain->
 std::array<double, 4> window_of(const Scene& s)
 {
     if (s.terrain->window) return *s.terrain->window;
-    const auto& g = ground_of(s)->grid();
+    const auto& g = scene::ground_of(s)->grid();
     const double half = 0.5 * g.cell, hair = 1e-3 * elevation(s).cell(); // cells that only touch it are not meant
     const double x = s.map_frame.x + g.x - half, y = s.map_frame.y + g.y - half;
     return {x + hair, y + hair, x + g.columns * g.cell - hair, y + g.rows * g.cell - hair};
@@ -159,17 +155,12 @@ double height_error(const scene::HeightError& e, std::uint64_t seed, double x, d
     // Normal numbers at the points of a square grid, smoothed by quadratic B-splines and scaled so that each place has the same spread. No
     // function of a mathematics library comes in, whose last digits differ between machines.
     const auto normal = [&](std::int64_t i, std::int64_t j) {
-        const auto mixed = [](std::uint64_t v) { // splitmix64's
-            v = (v ^ (v >> 30)) * 0xbf58476d1ce4e5b9ull;
-            v = (v ^ (v >> 27)) * 0x94d049bb133111ebull;
-            return v ^ (v >> 31);
-        };
         // Of neighbours and of other seeds nothing in common.
-        std::uint64_t z = mixed(mixed(seed + std::uint64_t(i)) + std::uint64_t(j));
+        std::uint64_t z = mix(mix(seed + std::uint64_t(i)) + std::uint64_t(j));
         double sum = -6; // of twelve numbers in [0, 1): variance 1
         for (int k = 0; k < 12; ++k) {
             z += 0x9e3779b97f4a7c15ull;
-            sum += double(mixed(z) >> 11) * 0x1p-53;
+            sum += double(mix(z) >> 11) * 0x1p-53;
         }
         return sum;
     };

@@ -152,8 +152,7 @@ private:
         } else {
             const double own = base_.layers_of(base_.scene.space.spacing);
             const double wanted = layers_.preliminary > 0 ? layers_.preliminary : std::min(preliminary_layers, std::max(own, 1.0));
-            preliminary_spacing_ = fixed_spacing_ || !base_.scene.start.from.empty() ? base_.scene.space.spacing
-                                                                                     : possible_spacing(base_, base_.spacing_of(wanted));
+            preliminary_spacing_ = fixed_spacing_ ? base_.scene.space.spacing : possible_spacing(base_, base_.spacing_of(wanted));
             plan_ = {{"of", identity()}, {"preliminary_spacing", preliminary_spacing_}, {"group", 0}};
         }
         base_.coarsest = preliminary_spacing_;

@@ -1,4 +1,5 @@
 #include "solver/app/hazard/sample.hpp"
+#include "solver/core/mix.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -13,13 +14,7 @@ Draws::Draws(std::uint64_t seed, std::string_view name)
     for (int k = 0; k < 8; ++k) add(seed >> (8 * k) & 255);
     for (const char c : name) add((unsigned char)(c));
 }
-std::uint64_t Draws::bits()
-{
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15ull;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return z ^ (z >> 31);
-}
+std::uint64_t Draws::bits() { return mix(state_ += 0x9e3779b97f4a7c15ull); }
 double Draws::share() { return double(bits() >> 11) * 0x1p-53; }
 std::uint64_t Draws::below(std::uint64_t n) { return std::uint64_t((__uint128_t(bits()) * n) >> 64); }
 

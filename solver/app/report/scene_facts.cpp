@@ -3,6 +3,7 @@
 #include "io/scene_file.hpp"
 #include "io/summary.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/height_field.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/numbers.hpp"
@@ -82,14 +83,6 @@ std::int64_t whole(double bytes) { return std::int64_t(std::min(bytes, 9e18)); }
 
 namespace {
 
-/// The heights of real ground; nothing where a scene has none.
-const scene::HeightField* ground_of(const Scene& s)
-{
-    for (const auto& wall : s.walls)
-        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) return g->field.get();
-    return nullptr;
-}
-
 const char* bed_of(const scene::Release& r)
 {
     if (!r.surface.empty()) return "the slip surface";
@@ -161,7 +154,7 @@ nlohmann::ordered_json to_json(const SceneFacts& f)
                              {"effects", io::effects_json(s.notes)},
                              {"numbers", numbers},
                              {"warnings", f.warnings}};
-    if (const auto* field = ground_of(s)) j["ground"] = ground_json(s, *field);
+    if (const auto* field = scene::ground_of(s)) j["ground"] = ground_json(s, *field);
     return j;
 }
 
@@ -178,7 +171,7 @@ std::string to_text(const SceneFacts& f)
     add("  particles   {} soil, {} wall, {:g} m apart, {}-D\n", e.soil, e.walls, s.space.spacing, s.dimensions);
     add("  step        {:.3g} s{}, {}{} steps to {:g} s\n", e.dt, s.time.step ? " (fixed)" : " (follows the motion)",
         s.time.step ? "" : "about ", e.steps, s.time.end);
-    if (const auto* field = ground_of(s)) text += ground_text(s, *field);
+    if (const auto* field = scene::ground_of(s)) text += ground_text(s, *field);
     add("  pair model  {}\n", f.pair_model);
     add("  memory      {} in all, disk {}\n", bytes_text(f.memory), bytes_text(e.disk()));
     add("  time        about {} on {}\n\n", forecast_text(f.time), f.where);

@@ -2,6 +2,7 @@
 #include "io/ground/crs.hpp"
 #include "io/ground/raster.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/height_field.hpp"
 #include "solver/scene/ring.hpp"
 #include <algorithm>
@@ -333,9 +334,7 @@ void Maps::write_outlines(const io::Place& folder, const std::vector<io::MapPict
 void Maps::write_pictures(const io::Place& folder, const std::vector<MapCell>& cells, const std::vector<io::MapPicture::Outline>& outlines)
 {
     if (!io::can_draw()) return;
-    const scene::HeightField* ground = nullptr;
-    for (const auto& wall : scene_.walls)
-        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) ground = g->field.get();
+    const scene::HeightField* ground = scene::ground_of(scene_);
     Together files(folder);
     for (const std::string_view name : {"h_max", "t_arrival"}) {
         io::MapPicture picture{.kind =

@@ -1,4 +1,5 @@
 #include "solver/app/scaling/forecast.hpp"
+#include "solver/core/mix.hpp"
 #include "solver/run/simulation.hpp"
 #include "solver/scene/check.hpp"
 #include <algorithm>
@@ -26,12 +27,7 @@ double chain_seconds()
 {
     const double begin = omp_get_wtime();
     std::uint64_t z = 1;
-    for (int k = 0; k < 1000000; ++k) {
-        z += 0x9e3779b97f4a7c15ull;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-        z ^= z >> 31;
-    }
+    for (int k = 0; k < 1000000; ++k) z = mix(z + 0x9e3779b97f4a7c15ull);
     volatile std::uint64_t sink = z;
     (void)sink;
     return omp_get_wtime() - begin;
@@ -50,7 +46,7 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     const double points = std::round(s.dimensions == 3 ? std::cbrt(wanted) : std::sqrt(wanted)), edge = points * s.space.spacing;
     const double shake = 0.2 * s.space.spacing;
     s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
-    s.walls.clear();
+    s.walls.clear(), s.events.clear(), s.probes.clear();
     s.bodies.resize(1);
     s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
     s.time = {1.0, 1e-3 * scene::crossing_time(s)};
