@@ -82,12 +82,11 @@ int decimals(const std::vector<State>& states)
     return std::isfinite(gap) ? std::clamp(int(std::ceil(-std::log10(gap) - 1e-6)), 2, 9) : 3;
 }
 
-std::vector<Vector> walls_of(const Place& first)
+std::vector<Vector> walls_of(const Place& state)
 {
-    const Place alone = first.beside("walls.hdf");
+    const Place alone = state.beside("walls.hdf");
     const std::lock_guard lock(hdf5);
-    if (exists(alone)) return read_walls(H5Reader(alone));
-    return read_walls(H5Reader(first));
+    return read_walls(H5Reader(exists(alone) ? alone : state));
 }
 
 } // namespace
@@ -232,12 +231,17 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
     }
     if (!mine.empty()) try {
             const auto walls = walls_of(first_file);
-            std::vector<Vector> shown;
-            for (const Vector& w : walls)
-                if (in_slice(w)) shown.push_back(w);
             const Extent frame = frame_of(all, reach_of(walls, {}).all, task.dimensions, task.spacing);
             const ColorRange range = color_range(all, color->has_signs(), task.range);
-            const Painter painter(stage_of(frame, view), range, color->quantity(), task.title, task.spacing, shown, flat);
+            const auto painter_with = [&](const std::vector<Vector>& all_walls) {
+                std::vector<Vector> shown;
+                for (const Vector& w : all_walls)
+                    if (in_slice(w)) shown.push_back(w);
+                return Painter(stage_of(frame, view), range, color->quantity(), task.title, task.spacing, shown, flat);
+            };
+            // Walls that events change are in every snapshot.
+            const bool walls_change = !exists(first_file.beside("walls.hdf")) && !walls.empty();
+            const Painter painter = painter_with(walls);
             if (me == 0 && !painter.missing().empty())
                 warnings.push_back(
                     fmt::format("no font here has \"{}\": pictures show boxes. Remedy: apt-get install fonts-ipafont-gothic, or "
@@ -256,7 +260,8 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
                         s.soil.positions.resize(to), s.soil.values.resize(to);
                     }
                     const Moment moment{s.soil.positions, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits), s.soil.failed};
-                    write_lightly(task.file ? task.file(s.number) : picture_file(task.results, s.number), painter.draw(moment));
+                    write_lightly(task.file ? task.file(s.number) : picture_file(task.results, s.number),
+                                  walls_change ? painter_with(walls_of(s.file)).draw(moment) : painter.draw(moment));
                     s.soil = {};
                 } catch (const std::exception& e) {
                     complain(complaint, e.what());

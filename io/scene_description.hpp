@@ -417,6 +417,34 @@ template <class A> void describe_events(A& a, Scene& s)
                       .range = between(0, 10),
                       .example = "0.05",
                       .doc = "damping as effects.damping, from then on; 0: none"});
+            a.table(path + ".move", e.move,
+                    {.example = "{ wall = \"gate\", velocity = [0.0, 0.0, 1.5] }", .doc = "a wall that moves, from from to to"},
+                    [&](const std::string& p, scene::WallMove& m) {
+                        a.text(p + ".wall", m.wall, {.example = "\"gate\"", .doc = "name of the wall"});
+                        a.vector(p + ".velocity", m.velocity,
+                                 {.unit = "m/s",
+                                  .range = between(-1e6, 1e6),
+                                  .fallback = "[0.0, 0.0, 0.0]",
+                                  .example = "[0.0, 0.0, 1.5]",
+                                  .doc = "velocity, of the center where it turns too"});
+                        a.table(p + ".rotation", m.turn,
+                                {.example = "{ center = [1.0, 0.0, 0.0], rate = 2.0 }", .doc = "the wall turns as well"},
+                                [&](const std::string& q, scene::Turn& t) {
+                                    a.vector(q + ".center", t.center,
+                                             {.unit = "m",
+                                              .range = coordinate,
+                                              .example = "[1.0, 0.0, 0.0]",
+                                              .doc = "a point of the axis when the motion begins"});
+                                    a.vector(q + ".axis", t.axis,
+                                             {.unit = "1",
+                                              .range = between(-1e6, 1e6),
+                                              .fallback = "[0.0, 1.0, 0.0]",
+                                              .example = "[0.0, 1.0, 0.0]",
+                                              .doc = "direction of the axis; a right-handed turn about it is positive"});
+                                    a.angle(q + ".rate", t.rate,
+                                            {.unit = "deg/s", .range = between(-1e6, 1e6), .example = "2.0", .doc = "how fast it turns"});
+                                });
+                    });
             a.soil_changes(path + ".soil", e.soils, s.soils,
                            {.optional = true, .example = "[event.soil.sand]", .doc = "what a soil becomes; only what is written changes"},
                            [&](const std::string& p, scene::SoilChange& soil) { describe_soil_change(a, p, soil); });

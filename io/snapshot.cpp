@@ -255,7 +255,7 @@ Snapshots::Snapshots(const Team& team, const Place& directory, std::optional<dou
 Place Snapshots::write(const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     const Entry entry{fmt::format("state_{:06}.hdf", next_), label.time};
-    if (!walls_there_) {
+    if (!walls_there_ && !label.walls_change) {
         const Place alone = directory_ / "walls.hdf";
         const bool there = team_.any(team_.rank() == 0 && exists(alone));
         Particles no_soil;
@@ -264,7 +264,7 @@ Place Snapshots::write(const Particles& p, const WallPoints& walls, const Snapsh
             write_snapshot(team_, alone, no_soil, walls, {label.time, label.step, label.dimensions, label.title, {"density"}, {}});
         walls_there_ = true;
     }
-    write_snapshot(team_, directory_ / entry.name, p, next_ == 0 ? walls : WallPoints{}, label);
+    write_snapshot(team_, directory_ / entry.name, p, next_ == 0 || label.walls_change ? walls : WallPoints{}, label);
     entries_.push_back(entry);
     ++next_;
     write_series();

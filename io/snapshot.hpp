@@ -19,6 +19,7 @@ struct SnapshotLabel {
     std::string title;
     std::vector<std::string> fields;         // of snapshot_fields(); empty: all
     std::optional<std::int64_t> failed = {}; // id of the particle at which the numbers failed
+    bool walls_change = false;               // in the course of the run: every snapshot has the walls of its time
 };
 
 /// Size of a snapshot file of that many points (soil and wall).
@@ -46,8 +47,8 @@ Path snapshot_next_to(const Path& results, double time);
 /// True of state_000000.hdf and its like; the number in it.
 std::optional<int> snapshot_number(const Path& file);
 
-/// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series. The walls, which do not move, are in the first
-/// of them and, alone, in walls.hdf.
+/// The snapshots of one run: state_000000.hdf, state_000001.hdf ... and state.hdf.series. Walls that stay as they are, are in the first
+/// of them and, alone, in walls.hdf; walls that events change are in all of them.
 class Snapshots {
 public:
     /// Collective; the directory exists. With a restart time the snapshots up to it stay and later ones are

@@ -174,8 +174,9 @@ class Run:
 
     @property
     def walls(self):
-        """The wall particles: a Snapshot of points that do not move."""
-        return Snapshot(self.directory / "snapshots/walls.hdf", kind=1)
+        """The wall particles: a Snapshot of points. Where events change walls, those at the end (Snapshot(file, kind=1) of any other)."""
+        alone = self.directory / "snapshots/walls.hdf"
+        return Snapshot(alone if alone.exists() else self.snapshots[-1].file, kind=1)
 
     def surface(self, t=None, window=None):
         """The Surface at the snapshot next to t (s; the last without one), its heights taken over `window` (m)."""

@@ -152,6 +152,7 @@ struct Setting {
     std::span<const scene::Wall> walls;
     double damping = 0;
     WallLaw law = mirrored;
+    std::vector<scene::RigidMotion> motion = {}, next_motion = {}; // of each wall, in this step and the next; none: they stand still
     Kernel kernel() const { return {how.kernel, how.dimensions, how.h}; }
     double volume() const { return std::pow(how.spacing, how.dimensions); } // of a particle at reference density
 };

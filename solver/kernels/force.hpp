@@ -24,6 +24,17 @@ protected:
         S nearest, sunk, grip;  // square of the distance to the nearest wall point; how far behind its face; tan(delta) there
         Vec3<S> out;            // that face's normal
     };
+    /// Power of walls that move: sum f (P (sigma_i grad W)).v_w, with v_w of this step and of the one to come, of Coulomb faces apart; of
+    /// those sum f (n.grad W) v_w and sum f n.grad W.
+    template <class S> struct WallPower {
+        S held, held_next, pressing, pressing_next;
+        Vec3<S> carried, carried_next;
+        S facing;
+    };
+    /// Work of walls a second, W, before and to come.
+    struct Watts {
+        U now, next;
+    };
     template <class S>
     using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
     using Lane = Row<W>;
@@ -58,11 +69,15 @@ private:
         unsigned awake = 0;
         if (in.sleep == SleepStage::Freeze) awake = awake_near(i, near, kinematics_.data(), stresses_.data(), 2 * model_.kernel.h);
         ForceWalls<Lane> walls{};
+        WallPower<Lane> power;
         const auto runs = in.lists->walls(cluster);
-        if (!runs.empty()) tally.pairs += sum_wall_forces(in, i, runs, walls);
+        const bool moving = !runs.empty() && Below::walls_move();
+        if (moving) power = {}, tally.pairs += sum_wall_forces<true>(in, i, runs, walls, &power);
+        else if (!runs.empty()) tally.pairs += sum_wall_forces<false>(in, i, runs, walls, nullptr);
         Below::for_each_register(
-            i, [&](const Lanes& lanes)
-                   __attribute__((always_inline)) { update_force(in, sums, walls, !runs.empty(), lanes, awake, tally); });
+            i, [&](const Lanes& lanes) __attribute__((always_inline)) {
+                update_force(in, sums, walls, !runs.empty(), moving ? &power : nullptr, lanes, awake, tally);
+            });
     }
 
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
@@ -107,8 +122,9 @@ private:
     }
 
     /// Returns the wall pairs inside the support.
+    template <bool moving>
     [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
-                                                   ForceWalls<Lane>& out) const
+                                                   ForceWalls<Lane>& out, WallPower<Lane>* power_out) const
     {
         const auto& p = std::as_const(*in.particles);
         const auto s = p[field::stress];
@@ -118,10 +134,11 @@ private:
                             narrow(s.column[3]), narrow(s.column[4]), narrow(s.column[5])};
         const Vec3<V> velocity{narrow(v.column[0]), narrow(v.column[1]), narrow(v.column[2])};
         ForceWalls<V> sums{};
+        WallPower<V> power{};
         sums.nearest = Below::lengths().support2;
         std::int64_t pairs = 0;
         const V none(T(0));
-        Below::for_each_wall_pair(i, runs, {none, none, none}, [&](Vec3<V> r, V r2, unsigned hits, const Mirror<V>& m) {
+        Below::template for_each_wall_pair<moving>(i, runs, {none, none, none}, [&](Vec3<V> r, V r2, unsigned hits, const Mirror<V>& m) {
             pairs += std::popcount(hits & i.moving);
             const V support = Below::lengths().support, zero(T(0));
             const auto inv = root<M::Kernel::divides>(r2);
@@ -132,7 +149,16 @@ private:
             sums.held = fma(holds, crossing, sums.held), sums.pressing = fma(slides, crossing, sums.pressing);
             const V along = dot(traction, m.normal), facing = slides * dot(g, m.normal);
             sums.limit = fma(slides * m.tangent, along, sums.limit);
-            sums.approach = fma(facing, dot(velocity, m.normal), sums.approach);
+            Vec3<V> relative = velocity;
+            if constexpr (moving) {
+                relative = relative - m.v;
+                const V now = dot(crossing, m.v), next = dot(crossing, m.next);
+                power.held = fma(holds, now, power.held), power.held_next = fma(holds, next, power.held_next);
+                power.pressing = fma(slides, now, power.pressing), power.pressing_next = fma(slides, next, power.pressing_next);
+                power.carried = fma(facing, m.v, power.carried), power.carried_next = fma(facing, m.next, power.carried_next);
+                power.facing = power.facing + facing;
+            }
+            sums.approach = fma(facing, dot(relative, m.normal), sums.approach);
             sums.area = fma(facing, m.normal, sums.area);
             const auto nearer = less(r2, sums.nearest);
             sums.nearest = min(sums.nearest, r2), sums.sunk = select(nearer, m.sunk, sums.sunk);
@@ -141,11 +167,13 @@ private:
                         select(nearer, m.normal.z, sums.out.z)};
         });
         widen<V>(sums, out);
+        if constexpr (moving) widen<V>(power, *power_out);
         return pairs;
     }
 
+    /// `power`: of walls that move; none: they stand still.
     KUZURE_INLINE void update_force(const StepInput& in, const ForceSums<Lane>& rows, const ForceWalls<Lane>& wall_rows, bool walled,
-                                    const Lanes& lanes, unsigned awake, Tally<U>& tally)
+                                    const WallPower<Lane>* power, const Lanes& lanes, unsigned awake, Tally<U>& tally)
     {
         auto& p = *in.particles;
         const auto& was = std::as_const(p);
@@ -169,8 +197,14 @@ private:
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
         if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
-        if (walled) wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho);
-        else forget_contact(p, lanes);
+        if (walled) {
+            Watts watts{zero, zero};
+            wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho, power, watts);
+            if (power) {
+                const U mass = U(volume_) * soil.rho0;
+                Below::book_work_of_walls(in, lanes, mass * watts.now, mass * watts.next, tally.energy.wall, tally.later.wall, tally);
+            }
+        } else forget_contact(p, lanes);
         if (p.has(field::wall_force)) tell_of_walls(p, lanes, wall, walled);
         const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
         Vec3<U> a = ((stress + viscous) + (artificial + wall)) + body;
@@ -261,8 +295,10 @@ private:
     {
         p[field::wall_slip].set(i, Vector{}), p[field::wall_pressure].set(i, 0.0), p[field::wall_friction].set(i, 0.0);
     }
-    /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on.
-    KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho) const
+    /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on. `watts`: the power of walls
+    /// that move, of a unit of mass.
+    KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho,
+                                            const WallPower<Lane>* power_rows, Watts& watts) const
     {
         const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(rows, lanes.first);
         const U scale = U(scale_) * volume / rho;
@@ -272,12 +308,17 @@ private:
             return hold_out(unit_ * lane(w.sunk, k), m.c_p, h_);
         });
         const Vec3<U> held = scale * w.held + push_out * w.out;
+        WallPower<U> power{};
+        if (power_rows) {
+            power = lanes_at<U, WallPower<U>, WallPower<Lane>, W>(*power_rows, lanes.first);
+            watts = {scale * power.held, scale * power.held_next};
+        }
         if (!p.has(field::wall_slip)) return held;
         const auto slip = p[field::wall_slip];
         const auto pressure = p[field::wall_pressure];
         const auto limit = p[field::wall_friction];
         const auto v = std::as_const(p)[field::velocity];
-        double out[3][width<U>] = {};
+        double out[3][width<U>] = {}, worked[2][width<U>] = {};
         const auto at = [&](U a, int k) { return lane(a, k); };
         for (int k = 0; k < lanes.n; ++k) {
             if (!(lanes.moving >> (lanes.first + k) & 1)) continue;
@@ -295,12 +336,23 @@ private:
             const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
             const double presses = (counts ? held_by : 0) + at(push_out, k) * at(w.grip, k);
             const double most = limit[i] + lag(in.dt, m.c_p, h_).take * presses;
+            // the faces' mean velocity
+            Vector carried{}, carried_next{};
+            if (power_rows && at(power.facing, k) != 0) {
+                const double share = 1 / at(power.facing, k);
+                carried = share * Vector{at(power.carried.x, k), at(power.carried.y, k), at(power.carried.z, k)};
+                carried_next = share * Vector{at(power.carried_next.x, k), at(power.carried_next.y, k), at(power.carried_next.z, k)};
+            }
             // a spring of the soil's own shear stiffness across half a smoothing length
-            const auto f = return_to_coulomb(slip[i], in.dt * v[i], (1 / area) * faces, most, m.shear * area / (0.5 * h_));
+            const auto f = return_to_coulomb(slip[i], in.dt * (v[i] - carried), (1 / area) * faces, most, m.shear * area / (0.5 * h_));
             slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
             const Vector all = counts ? push + f.force : f.force;
             out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;
+            if (!power_rows) continue;
+            worked[0][k] = (counts ? s * at(power.pressing, k) : 0) + dot(f.force, carried);
+            worked[1][k] = (counts ? s * at(power.pressing_next, k) : 0) + dot(f.force, carried_next);
         }
+        if (power_rows) watts.now = watts.now + load<U>(worked[0]), watts.next = watts.next + load<U>(worked[1]);
         return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};
     }
 };

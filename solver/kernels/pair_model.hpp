@@ -42,6 +42,42 @@ struct StepInput {
     double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest
 };
 
+/// Where a wall stands at the start of a step, at its end and at that of the next, seen from where it stood when the model's walls were
+/// set.
+struct WallPlace {
+    scene::Pose before, after, later;
+};
+/// All walls of a scene in a step of length dt before one of length `next`, s; of no length: at its end.
+struct WallStep {
+    std::span<const WallPlace> walls;
+    double dt, next;
+    bool midway; // of the step, else at its end
+    /// Mean velocity (m/s) of what was at x (m) when walls were set, in this step and in the next.
+    Vector velocity(int wall, Vector x) const
+    {
+        const WallPlace& w = walls[std::size_t(wall)];
+        return dt > 0 ? (1 / dt) * (scene::placed(w.after, x) - scene::placed(w.before, x)) : next_velocity(wall, x);
+    }
+    Vector next_velocity(int wall, Vector x) const
+    {
+        const WallPlace& w = walls[std::size_t(wall)];
+        return (1 / next) * (scene::placed(w.later, x) - scene::placed(w.after, x));
+    }
+    /// Where that is now; half-way along the chord, as soil is at mid-step.
+    Vector place(int wall, Vector x) const
+    {
+        const WallPlace& w = walls[std::size_t(wall)];
+        const Vector after = scene::placed(w.after, x);
+        return midway ? 0.5 * (scene::placed(w.before, x) + after) : after;
+    }
+    Vector turned(int wall, Vector normal) const
+    {
+        const WallPlace& w = walls[std::size_t(wall)];
+        const Vector after = scene::turned(w.after, normal), n = midway ? scene::turned(w.before, normal) + after : after;
+        return (1 / length(n)) * n;
+    }
+};
+
 /// One stage of a step: a pass over all clusters, and the exchange of ghost rows before it.
 struct Stage {
     const char* name;
@@ -74,6 +110,8 @@ public:
     virtual void make_records(const Particles&, std::span<const Material>, std::span<const std::int32_t> ghost_soil) = 0;
     /// The wall points near this rank's soil; the scene must outlive the model's use.
     virtual void set_walls(const Scene&, std::span<const WallPoints>) = 0;
+    /// Walls as they stand in the stage to come, where some move.
+    virtual void place_walls(const WallStep&) {}
 
     /// True where a step first moves the particles by the acceleration they have (move()), which must be there at the start: stages run
     /// once with a step of no length. The length of the step to come is then decided one step ahead.

@@ -10,7 +10,8 @@
 //                    + 1/rho_i sum_w V_w 2 P_w (sigma_i . grad W) + friction;  v_i += dt/2 a_i
 //
 // A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
-// nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's.
+// nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's. Where the wall of that face
+// moves, v_i less the velocity of the face takes the place of v_i, and its power counts apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include <algorithm>
@@ -110,6 +111,7 @@ struct Face {
     Vector normal;
     double depth; // m
     int wall;     // whose contact counts
+    Vector side;  // of that wall there: at an edge not the normal
 };
 /// Where faces of two walls meet in one edge, the one with more grip counts: rough, then Coulomb by its friction, then smooth.
 inline double grip(const scene::Wall& w)
@@ -153,8 +155,9 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
             if (!straight && !folds(ground, on.point, normal)) continue;
             const auto same = std::ranges::find_if(
                 all, [&](const Face& f) { return std::fabs(f.depth - depth) <= least && dot(f.normal, normal) > 1 - 1e-9; });
-            if (same == all.end()) all.push_back({normal, depth, part.wall});
-            else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)])) same->wall = part.wall;
+            if (same == all.end()) all.push_back({normal, depth, part.wall, on.normal});
+            else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)]))
+                same->wall = part.wall, same->side = on.normal;
         }
     // Of equally near ones that which looks up, then along x, then y: the order of walls and faces does not show.
     std::ranges::sort(all, {}, [&](const Face& f) { return f.depth - least * dot(f.normal, {0.1, 0.01, 1}); });
@@ -164,6 +167,7 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
 struct GroundPoint {
     Vector x;
     std::vector<Face> faces;
+    int wall; // its own
 };
 /// The face at which a point mirrors particle i, x_ij = x_i - x_w: the nearest that has i in front, else the nearest.
 inline const Face& mirroring(const GroundPoint& w, Vector x_ij)
@@ -176,6 +180,17 @@ inline const Face& mirroring(const GroundPoint& w, Vector x_ij)
 inline Vector crossing(const scene::Wall& wall, const Face& face, Vector a)
 {
     return wall.surface == scene::Surface::Rough ? a : dot(a, face.normal) * face.normal;
+}
+
+/// Velocity of the face at which a point mirrors, m/s: at an edge that one wall makes with that of the point, of the one along its own
+/// normal and of the other across it.
+inline Vector velocity_of(const GroundPoint& w, const Face& face, const std::vector<scene::RigidMotion>& motion)
+{
+    if (motion.empty()) return {};
+    const Vector foot = w.x + face.depth * face.normal, v = motion[std::size_t(face.wall)].at(foot);
+    if (w.wall == face.wall || dot(face.side, face.normal) > 1 - 1e-9) return v;
+    const Vector other = motion[std::size_t(w.wall)].at(foot);
+    return other + dot(v - other, face.side) * face.side;
 }
 
 // ---- the state -----------------------------------------------------------------------------------------------------
@@ -195,7 +210,8 @@ struct Strain {
     Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
     Vector viscous{};      // acceleration, m/s^2
     bool beside_wall = false;
-    double friction = 0; // the most that it carries, without what this step's stress allows, m/s^2
+    double power = 0, next_power = 0; // of moving walls by viscosity, in this step and the next, W/kg
+    double friction = 0;              // the most that it carries, without what this step's stress allows, m/s^2
 };
 inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
 {
@@ -224,7 +240,7 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         if (w.faces.empty() || grad == Vector{}) continue;
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
-        const Vector mirrored = mirror * crossing(wall, face, i.v); // v_iw
+        const Vector mirrored = mirror * crossing(wall, face, i.v - velocity_of(w, face, s.motion)); // v_iw
         (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) =
             (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) + -i.volume * outer(mirrored, grad);
         of_i.beside_wall = true;
@@ -232,7 +248,10 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         Particle shown = i; // the wall shows i itself
         shown.x = w.x;
         const double Pi = viscosity(*viscous, s.how.h, here, shown, mirrored);
-        pressure = pressure + (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
+        const Vector push = (i.volume * i.density * i.density * Pi) * crossing(wall, face, grad);
+        pressure = pressure + push;
+        of_i.power -= dot(push, velocity_of(w, face, s.motion)) / i.density;
+        of_i.next_power -= dot(push, velocity_of(w, face, s.next_motion)) / i.density;
         if (wall.surface == scene::Surface::Coulomb)
             of_i.friction += std::tan(wall.friction_angle) * -i.volume * i.density * Pi * dot(grad, face.normal);
     }
@@ -282,7 +301,7 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
 // ---- stage "force" -----------------------------------------------------------------------------------------------------
 /// Energies taken (J) by viscosity, artificial stress, walls and damping.
 struct Taken {
-    double viscous = 0, stabilising = 0, wall = 0, damping = 0;
+    double viscous = 0, stabilising = 0, wall = 0, damping = 0, moved_wall = 0;
 };
 struct Forced {
     Vector acceleration, velocity;
@@ -307,6 +326,9 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
     Vector area{};                          // of Coulomb faces, along their normals, 1/m
     double limit = 0, approach = 0;
+    double held_power[2] = {}, push_power[2] = {}; // of walls in this step and the next, W/m^3
+    Vector carried[2] = {};                        // sum of face areas times their velocities
+    double all_faces = 0;
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         const Vector x_ij = i.x - soil.x[l];
         if (l == k || length(x_ij) >= 2 * s.how.h) continue;
@@ -325,6 +347,9 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
+        const Vector v_w[2] = {velocity_of(w, face, s.motion), velocity_of(w, face, s.next_motion)};
+        for (int t = 0; t < 2; ++t)
+            (wall.surface == scene::Surface::Coulomb ? push_power : held_power)[t] += dot(crossing(wall, face, traction), v_w[t]);
         if (wall.surface != scene::Surface::Coulomb) {
             held = held + crossing(wall, face, traction);
             continue;
@@ -332,9 +357,12 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         push = push + crossing(wall, face, traction);
         limit += std::tan(wall.friction_angle) * dot(traction, face.normal);
         const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
-        area = area - facing * face.normal, approach += facing * dot(i.v, face.normal);
+        area = area - facing * face.normal, approach += facing * dot(i.v - v_w[0], face.normal);
+        for (int t = 0; t < 2; ++t) carried[t] = carried[t] + facing * v_w[t];
+        all_faces += facing;
     }
     Vector by_walls = (1 / i.density) * held;
+    double power[2] = {held_power[0] / i.density, held_power[1] / i.density};
     // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
     // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (length(area) > 0) {
@@ -344,16 +372,20 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         of_i.pressed = limit > 0 ? length(push) / i.density : 0;
         of_i.friction = kept.friction + (dt > 0 ? dt / (lag + dt) : 1) * presses;
         if (felt) by_walls = by_walls + (1 / i.density) * push;
+        for (int t = 0; t < 2; ++t) power[t] += felt ? push_power[t] / i.density : 0;
+        if (all_faces != 0)
+            for (Vector& c : carried) c = (1 / all_faces) * c; // the mean velocity of the faces
         if (of_i.friction > 0) {
             const double stiffness = material.shear * length(area) / (s.how.h / 2) / i.density; // 1/s^2
             const Vector n = (1 / length(area)) * area;
-            Vector slip = kept.slip + dt * i.v;
+            Vector slip = kept.slip + dt * (i.v - carried[0]);
             slip = slip - dot(slip, n) * n;
             of_i.rubs = Forced::Rubs::Sticks;
             if (const double trial = stiffness * length(slip); trial > of_i.friction)
                 slip = (of_i.friction / trial) * slip, of_i.rubs = Forced::Rubs::Slides;
             of_i.slip = slip;
             by_walls = by_walls - stiffness * slip;
+            for (int t = 0; t < 2; ++t) power[t] -= stiffness * dot(slip, carried[t]);
         }
     }
     const Vector water = (-1 / material.density) * PoreWater::from(e).at(i.x).gradient;
@@ -364,11 +396,12 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     of_i.velocity = i.v + (dt / 2) * of_i.acceleration;
     const Vector then = i.v + kick * of_i.acceleration;
     const double mass = i.density * i.volume;
-    const auto taken = [&](Vector v, double time) {
+    const auto taken = [&](Vector v, double time, double watts) {
         const auto by = [&](Vector a) { return -mass * time * dot(a, v); };
-        return Taken{by(kept.acceleration), by((1 / i.density) * art), by(by_walls), by((-s.damping / 2) * (i.v + then))};
+        const double given = mass * time * watts;
+        return Taken{by(kept.acceleration), by((1 / i.density) * art), by(by_walls) + given, by((-s.damping / 2) * (i.v + then)), -given};
     };
-    of_i.before = taken(i.v, dt / 2), of_i.coming = taken(then, next / 2);
+    of_i.before = taken(i.v, dt / 2, power[0]), of_i.coming = taken(then, next / 2, power[1]);
     return of_i;
 }
 

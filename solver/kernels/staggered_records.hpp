@@ -3,6 +3,7 @@
 // of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice.
 #include "solver/kernels/cluster_pass.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/walls/adjoint.hpp"
 
@@ -76,7 +77,9 @@ public:
     void set_walls(const Scene& scene, std::span<const WallPoints> points) override
     {
         const WallSurface surface(scene);
-        walls_.assign(points.size(), {});
+        walls_.assign(points.size(), {}), moving_points_.clear(), moving_faces_.clear();
+        std::vector<bool> moves(scene.walls.size());
+        for (const int w : scene::moving_walls(scene)) moves[std::size_t(w)] = true;
         for (std::size_t w = 0; w < points.size(); ++w) {
             auto& to = walls_[w];
             const Index n = Index(points[w].x.size());
@@ -88,8 +91,13 @@ public:
                 surface.faces({points[w].x[k], points[w].y[k], points[w].z[k]}, 2 * h_, found[k]);
             }
             for (Index k = 0; k < n; ++k) {
+                const Vector at{points[w].x[k], points[w].y[k], points[w].z[k]};
+                const int own = points[w].wall;
+                if (moves[std::size_t(own)]) moving_points_.push_back({w, k, own, at});
                 for (const Face& f : found[k]) {
                     const scene::Wall& wall = scene.walls[f.wall];
+                    if (moves[std::size_t(own)] || moves[std::size_t(f.wall)])
+                        moving_faces_.push_back({w, to.faces.size(), own, f.wall, at, f});
                     const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
                     to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
                                         T(wall.surface == scene::Surface::Rough), T(coulomb),
@@ -99,6 +107,24 @@ public:
                 to.first[k + 1] = Index(to.faces.size());
                 if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);
             }
+        }
+        if (scene::any_wall_moves(scene))
+            for (auto& w : walls_) w.motion.assign(w.faces.size(), {});
+    }
+    void place_walls(const WallStep& step) override
+    {
+        for (const auto& p : moving_points_) {
+            const Vector x = step.place(p.wall, p.x);
+            auto& to = walls_[p.record];
+            to.x[p.point] = fixed_(x.x), to.y[p.point] = fixed_(x.y), to.z[p.point] = fixed_(x.z);
+        }
+        for (const auto& f : moving_faces_) {
+            const Vector x = step.place(f.own, f.x), foot = step.place(f.wall, f.face.foot(f.x)), n = step.turned(f.wall, f.face.normal);
+            const Vector v = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.velocity(w, at); });
+            const Vector next = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.next_velocity(w, at); });
+            auto& to = walls_[f.record].faces[f.number];
+            to.nx = T(n.x), to.ny = T(n.y), to.nz = T(n.z), to.depth = T(dot(foot - x, n) / unit_);
+            walls_[f.record].motion[f.number] = {T(v.x), T(v.y), T(v.z), T(next.x), T(next.y), T(next.z)};
         }
     }
     void pack(int stage, Index owned, Vector shift, std::byte* to) const override
@@ -172,7 +198,7 @@ protected:
     }
 
     /// Visits the wall points inside the support: visit(r, r^2, lanes that they hit, mirror); `back` is taken off the positions.
-    template <class Visit>
+    template <bool moving, class Visit>
     KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, std::span<const Index> runs, Vec3<V> back, Visit visit) const
     {
         const auto [support, support2, softening, tiny] = Base::lengths();
@@ -185,12 +211,41 @@ protected:
                 const V r2 = dot(r, r);
                 const unsigned hits = bits(less(r2, support2)) & i.owned;
                 if (!hits || wall.first[point] == wall.first[point + 1]) continue;
-                visit(r, max(r2, tiny), hits, mirror(Law{}, r, &wall.faces[wall.first[point]]));
+                const FaceMotion<T>* motion = nullptr;
+                if constexpr (moving) motion = &wall.motion[wall.first[point]];
+                visit(r, max(r2, tiny), hits, mirror<moving>(Law{}, r, &wall.faces[wall.first[point]], motion));
             }
         }
     }
+    /// Work of moving walls on soil that goes through `account`, from its power (W) in the half step before and in the one to come: what
+    /// they give is no part of what that took.
+    static void book_work_of_walls(const StepInput& in, const Lanes& lanes, U before, U coming, U& account, U& later, Tally<U>& tally)
+    {
+        const U zero(0.0), magic(magic_of(in.energy_unit));
+        const auto mine = written<U>(lanes);
+        const U done = select(mine, quantized(U(0.5 * in.dt) * before, magic), zero);
+        const U then = select(mine, quantized(U(0.5 * in.next) * coming, magic), zero);
+        account += done, tally.energy.moved_wall -= done;
+        later += then, tally.later.moved_wall -= then;
+    }
+    /// True where some wall near this rank's soil moves.
+    bool walls_move() const { return !moving_faces_.empty(); }
 
     std::vector<WallRecords<T>> walls_;
+    struct MovingPoint {
+        std::size_t record; // in walls_
+        Index point;
+        int wall;
+        Vector x; // m, where it was when walls were set
+    };
+    struct MovingFace {
+        std::size_t record, number; // in walls_, in its faces
+        int own, wall;              // of the point behind it, and whose face it is
+        Vector x;                   // of the point, m, and the face, when walls were set
+        Face face;
+    };
+    std::vector<MovingPoint> moving_points_;
+    std::vector<MovingFace> moving_faces_;
     Index n_ = 0;
     Array<Kinematics<T>> kinematics_;
     Array<Stresses<T>> stresses_;

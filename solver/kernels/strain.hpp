@@ -41,6 +41,10 @@ protected:
         S rubbing;                 // sum tan(delta) rho_i rho_j Pi n.grad W of Coulomb faces
         S walled;                  // not zero for a particle that feels a wall
     };
+    /// Power of walls that move, by viscosity: sum rho_i rho_j Pi (P grad W).v_w, with v_w of this step and of the one to come.
+    template <class S> struct ViscousPower {
+        S now, next;
+    };
     template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
     using Lane = Row<W>;
 
@@ -74,9 +78,27 @@ private:
         sum_strain(in, i, near, sums);
         StrainWalls<Lane> walls{};
         const auto runs = in.lists->walls(cluster);
-        if (!runs.empty()) sum_wall_strain(in, i, runs, walls);
+        if (!runs.empty()) {
+            if (Below::walls_move()) {
+                ViscousPower<Lane> power{};
+                sum_wall_strain<true>(in, i, runs, walls, &power);
+                if constexpr (M::viscous)
+                    Below::for_each_register(i, [&](const Lanes& lanes) { book_viscous_power(in, power, lanes, tally); });
+            } else sum_wall_strain<false>(in, i, runs, walls, nullptr);
+        }
         Below::for_each_register(
             i, [&](const Lanes& lanes) __attribute__((always_inline)) { update_strain(in, sums, walls, !runs.empty(), lanes, tally); });
+    }
+    /// What viscosity takes is less by what walls do through it.
+    [[gnu::noinline]] void book_viscous_power(const StepInput& in, const ViscousPower<Lane>& rows, const Lanes& lanes,
+                                              Tally<U>& tally) const
+    {
+        const auto& was = std::as_const(*in.particles);
+        const auto power = lanes_at<U, ViscousPower<U>, ViscousPower<Lane>, W>(rows, lanes.first);
+        const LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
+        const U rho = was[field::density].template load<U>(lanes.at), mass = U(volume_) * soil.rho0;
+        const U watts = (-mass * U(scale_) / rho) * (mass / rho);
+        Below::book_work_of_walls(in, lanes, watts * power.now, watts * power.next, tally.energy.viscous, tally.later.viscous, tally);
     }
 
     KUZURE_INLINE void sum_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, StrainSums<Lane>& out) const
@@ -116,22 +138,26 @@ private:
         widen<V>(sums, out);
     }
 
-    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
-                                           StrainWalls<Lane>& out) const
+    template <bool moving>
+    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, StrainWalls<Lane>& out,
+                                           ViscousPower<Lane>* power_out) const
     {
         const V half_dt(T(0.5 * in.dt / unit_));
         const Vec3<V> back{half_dt * i.v.x, half_dt * i.v.y, half_dt * i.v.z};
         StrainWalls<V> sums{};
-        Below::for_each_wall_pair(i, runs, back, [&](Vec3<V> r, V r2, unsigned, const Mirror<V>& m) {
+        ViscousPower<V> power{};
+        Below::template for_each_wall_pair<moving>(i, runs, back, [&](Vec3<V> r, V r2, unsigned, const Mirror<V>& m) {
             const auto [support, support2, softening, tiny] = Below::lengths();
             const V zero(T(0));
             const V rho_sum = i.rho + i.rho;
             const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
             const Vec3<V> g = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
-            const Vec3<V> Pv = m.factor * project(m, i.v);
+            Vec3<V> v = i.v;
+            if constexpr (moving) v = v - m.v;
+            const Vec3<V> Pv = m.factor * project(m, v);
             const V slides = m.coulomb, holds = V(T(1)) - slides;
-            const auto add = [&](Vec3<V>& held, Vec3<V>& sliding, V v) {
-                held = fma(holds * v, g, held), sliding = fma(slides * v, g, sliding);
+            const auto add = [&](Vec3<V>& held, Vec3<V>& sliding, V Pv_a) {
+                held = fma(holds * Pv_a, g, held), sliding = fma(slides * Pv_a, g, sliding);
             };
             add(sums.mirrored.x, sums.sliding.x, Pv.x), add(sums.mirrored.y, sums.sliding.y, Pv.y),
                 add(sums.mirrored.z, sums.sliding.z, Pv.z);
@@ -141,9 +167,14 @@ private:
                 const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                 sums.viscous = fma(pressure, project(m, g), sums.viscous);
                 sums.rubbing = fma(m.coulomb * m.tangent * pressure, dot(g, m.normal), sums.rubbing);
+                if constexpr (moving) {
+                    const Vec3<V> push = project(m, g);
+                    power.now = fma(pressure, dot(push, m.v), power.now), power.next = fma(pressure, dot(push, m.next), power.next);
+                }
             }
         });
         widen<V>(sums, out);
+        if constexpr (moving) widen<V>(power, *power_out);
     }
 
     /// What walls do to viscosity waits for the force stage.

@@ -27,6 +27,7 @@ struct Clock {
     double largest_energy = 0;  // J, that the guard has met: kinetic + elastic + potential drop, and the kinetic energy at the start
     EnergySums largest_taken{}; // J, the most that each has taken
     std::int64_t inspected = 0; // step of the guard's last inspection
+    double sorted_time = 0;     // s, at which particles were last sorted: where walls that move stood when lists were made
     int events = 0;             // that have begun, in their order (scene::order_of_events)
     std::int64_t taken = 0;     // energy units that events have taken out of the ledger; the same on every rank
     // Impulse on each named wall, in units of an impulse (WallForces); over ranks, kept by rank 0.

@@ -1,12 +1,13 @@
 #include "solver/run/layout.hpp"
 #include "solver/run/blocks.hpp"
+#include "solver/scene/motion.hpp"
 #include <limits>
 
 namespace kuzure {
 
 Layout::Layout(const Scene& scene, const scene::Filling& filling, Vector origin)
     : scene_(scene), filling_(filling), columns_(Columns::of(scene, origin)), reach_(list_reach(scene)),
-      skin_(scene.support() * scene.accuracy.skin)
+      skin_(scene.support() * scene.accuracy.skin), moving_(scene::moving_walls(scene))
 {
 }
 
@@ -110,7 +111,10 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
                a.high.z <= b.high.z;
     };
     const Vector margin{reach_, reach_, reach_}, ahead = 3.0 * margin;
-    if (wall_region_ && inside({lo - margin, hi + margin}, *wall_region_)) return;
+    std::vector<scene::Pose> poses;
+    for (const int w : moving_) poses.push_back(scene_.walls[std::size_t(w)].pose);
+    if (wall_region_ && inside({lo - margin, hi + margin}, *wall_region_) && poses == moved_poses_) return;
+    moved_poses_ = std::move(poses);
     wall_region_ = scene::Box{lo - margin - ahead, hi + margin + ahead};
     walls_.assign(scene_.walls.size(), {});
     for (std::size_t w = 0; w < walls_.size(); ++w) walls_[w].wall = int(w);
@@ -122,14 +126,47 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
             for (int c = -pz; c <= pz; ++c) {
                 const Vector shift{a * step.x, b * step.y, c * step.z};
                 filling_.for_each_wall_in({wall_region_->low - shift, wall_region_->high - shift}, [&](std::int64_t id, Vector at, int w) {
-                    if (!scene_.walls[std::size_t(w)].present) return;
+                    if (!scene_.walls[std::size_t(w)].present || std::ranges::count(moving_, w) > 0) return;
                     walls_[w].x.push_back(at.x + shift.x), walls_[w].y.push_back(at.y + shift.y), walls_[w].z.push_back(at.z + shift.z);
                     walls_[w].id.push_back(id);
                 });
             }
+    for (const int w : moving_)
+        if (scene_.walls[std::size_t(w)].present) add_moved_points(w);
     for (auto& w : walls_) w.sort(columns_);
     ++wall_renewals_;
     model.set_walls(scene_, walls_);
+}
+
+void Layout::add_moved_points(int wall)
+{
+    const scene::Wall& own = scene_.walls[std::size_t(wall)];
+    const Vector step = period(scene_);
+    const int px = scene_.space.periodic[0], py = scene_.space.periodic[1], pz = scene_.space.periodic[2];
+    const auto& region = *wall_region_;
+    // Where a fixed wall is, or one that moves and has a lower number, its points are enough.
+    const auto taken = [&](Vector x) {
+        for (int w = 0; w < int(scene_.walls.size()); ++w) {
+            const scene::Wall& other = scene_.walls[std::size_t(w)];
+            if (w == wall || !other.present || (w > wall && std::ranges::count(moving_, w) > 0)) continue;
+            if (scene::signed_distance(other, x, scene_.dimensions) < 0) return true;
+        }
+        return false;
+    };
+    auto& to = walls_[std::size_t(wall)];
+    filling_.for_each_of_wall(wall, [&](std::int64_t id, Vector drawn) {
+        const Vector x = scene::placed(own.pose, drawn);
+        if (taken(x)) return;
+        for (int a = -px; a <= px; ++a)
+            for (int b = -py; b <= py; ++b)
+                for (int c = -pz; c <= pz; ++c) {
+                    const Vector at = x + Vector{a * step.x, b * step.y, c * step.z};
+                    if (at.x < region.low.x || at.y < region.low.y || at.z < region.low.z || at.x > region.high.x || at.y > region.high.y ||
+                        at.z > region.high.z)
+                        continue;
+                    to.x.push_back(at.x), to.y.push_back(at.y), to.z.push_back(at.z), to.id.push_back(id);
+                }
+    });
 }
 
 void Layout::prepare_lists(StepInput& in, double way, double speed)

@@ -51,6 +51,8 @@ public:
 private:
     void exchange_ghosts(const Comm&, const Domain&, const Particles&, const PairModel&);
     void renew_walls(const Particles&, PairModel&);
+    /// Adds the points of a wall that moves as it stands now, those near the soil that are in no other wall.
+    void add_moved_points(int wall);
 
     const Scene& scene_;
     const scene::Filling& filling_;
@@ -64,6 +66,8 @@ private:
     ClusterLists lists_;
     std::vector<WallPoints> walls_;
     std::optional<scene::Box> wall_region_;
+    std::vector<int> moving_;              // walls that events move
+    std::vector<scene::Pose> moved_poses_; // for which walls are as they are
     std::int64_t wall_renewals_ = 0;
     // How far beyond the support the pruned lists reach, and an upper bound of any particle's displacement since they were made, m.
     double pruned_margin_ = 0, pruned_way_ = 0;

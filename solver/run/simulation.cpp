@@ -1,6 +1,7 @@
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/motion.hpp"
 #include <limits>
 #include <omp.h>
 
@@ -11,8 +12,8 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options,
       filling_(options_.filling ? std::move(*options_.filling) : scene::Filling(scene)), soils_(materials_of(scene)),
       model_(choose_model(scene, options_.arithmetic)), domain_(comm, block_space(scene, filling_, comm.size(), options_.blocks_per_rank)),
       layout_(scene_, filling_, low_corner(filling_, scene)),
-      balance_(comm, domain_, layout_.reach(), double(row_bytes(*model_)), options_.recut_every), watch_(comm, scene_, filling_, soils_),
-      wall_forces_(scene_, soils_, layout_), clock_(clock)
+      balance_(comm, domain_, layout_.reach(), double(row_bytes(*model_)), options_.recut_every), moving_(scene::moving_walls(scene)),
+      watch_(comm, scene_, filling_, soils_), wall_forces_(scene_, soils_, layout_), clock_(clock)
 {
 }
 
@@ -58,7 +59,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, Particles particles
             clock_.next = step_length(scene_, clock_);
             if (clock_.next > 0 && !scene_.time.step) clock_.extremes.displacement2 = std::numeric_limits<double>::infinity();
         }
-        balance_.cut_state(scene_, particles_, layout_, clock_.step > 0 || wall_forces_.any(), [&] { rebuild(false); });
+        balance_.cut_state(scene_, particles_, layout_, clock_.step > 0 || wall_forces_.any(), [&] { rebuild(false, clock_.time); });
     });
 }
 
@@ -112,20 +113,21 @@ Requests Simulation::step(Requests mine)
     ensure(dt > 0, "a finished run was asked for another step");
     if (!last_good_) remember(); // the start of the run, or of its restart
     const auto course = follow_courses(dt);
-    wall_forces_.add_impulse(particles_, 0.5 * dt, clock_);
+    bool bearable = wall_forces_.add_impulse(particles_, 0.5 * dt, clock_);
     StepInput in = step_input(dt, following_dt(dt));
     timers_.timed(Phase::Move, [&] { model_->move(in); });
     const bool rebuilt = layout_.outgrown(clock_.extremes.displacement2);
     const double way = model_->moves_first() ? dt * std::sqrt(clock_.extremes.half_step_speed2) : 0;
     if (model_->moves_first()) clock_.frame_way = clock_.frame_way + dt * frame(clock_.time + 0.5 * dt);
-    if (rebuilt) rebuild(true, way);
+    if (rebuilt) rebuild(true, time_after(scene_, clock_, dt), way);
     // The displacement that this step tells is that of the next one, or its own.
     const double after = model_->moves_first() ? in.next : dt, from = model_->moves_first() ? clock_.time + dt : clock_.time;
     in.frame = frame(from + 0.5 * after), in.frame_way = clock_.frame_way + after * in.frame;
     if (!model_->moves_first()) clock_.frame_way = in.frame_way;
     layout_.prepare_lists(in, way, std::sqrt(clock_.extremes.half_step_speed2));
-    const PassResult result = run_stages(in);
-    wall_forces_.add_impulse(particles_, 0.5 * dt, clock_);
+    PassResult result = run_stages(in);
+    bearable = wall_forces_.add_impulse(particles_, 0.5 * dt, clock_) && bearable;
+    if (!bearable) result.maxima.not_finite = 1; // the guard says more
     mine = end_step(in, result, mine);
     if (course) end_course(*course);
     watch_.judge_step(particles_, clock_);
@@ -145,14 +147,18 @@ double Simulation::following_dt(double dt) const
 PassResult Simulation::run_stages(const StepInput& in)
 {
     PassResult result;
-    for (int stage = 0; stage < int(model_->stages().size()); ++stage) result.add(run_stage(stage, in));
+    const int stages = int(model_->stages().size());
+    for (int stage = 0; stage < stages; ++stage) {
+        if (!moving_.empty()) place_walls(in, stage + 1 < stages); // strains are those of mid-step
+        result.add(run_stage(stage, in));
+    }
     return result;
 }
 
 void Simulation::evaluate_anew()
 {
     clock_.next = step_length(scene_, clock_);
-    rebuild(true);
+    rebuild(true, clock_.time);
     StepInput in = step_input(0, clock_.next);
     in.sleep = SleepStage::Off;
     layout_.prepare_lists(in, 0, std::sqrt(clock_.extremes.speed2));
@@ -162,8 +168,10 @@ void Simulation::evaluate_anew()
     reduce(result, {});
 }
 
-void Simulation::rebuild(bool sort_anew, double way)
+void Simulation::rebuild(bool sort_anew, double time, double way)
 {
+    if (sort_anew) clock_.sorted_time = time;
+    move_walls(clock_.sorted_time);
     if (sort_anew)
         timers_.timed(Phase::Migrate, [&] {
             layout_.wrap_into_period(particles_);
@@ -171,6 +179,8 @@ void Simulation::rebuild(bool sort_anew, double way)
             layout_.sort_at_present_positions(particles_);
         });
     layout_.rebuild(comm_, domain_, particles_, soils_, *model_, timers_, way);
+    wall_forces_.renew_faces();
+    move_walls(time);
     if (sort_anew) clock_.extremes.displacement2 = 0, clock_.frame_way = {};
     ++rebuilds_;
 }
@@ -242,6 +252,7 @@ Requests Simulation::reduce(const PassResult& result, Requests mine)
         for_each_member(e, e, [&](double& x, double&) { x = all[k++]; });
         mine = {all[n] != 0, all[n + 1] != 0};
     });
+    meet_walls();
     // Sleeping particles are not in the maxima: the step is never longer than the soil at rest allows.
     if (scene_.accuracy.sleep_below > 0)
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
@@ -302,6 +313,10 @@ SleepStage Simulation::sleep_stage() const
 {
     // Damping settles a state: there soil is slow before it is at rest.
     if (scene_.accuracy.sleep_below == 0 || damping() > 0) return SleepStage::Off;
+    const auto shoves = [&](const scene::Event& e) {
+        return e.move && clock_.time >= scene::begin_of(e) && clock_.time < scene::end_of(e);
+    };
+    if (std::ranges::any_of(start_scene_.events, shoves)) return SleepStage::Off; // a wall comes upon sleepers
     const auto phase = clock_.step % sleep_interval_;
     return phase == 0 ? SleepStage::Detect : phase == 1 ? SleepStage::Freeze : SleepStage::Frozen;
 }
@@ -313,46 +328,6 @@ void Simulation::count_work(Phase phase, const Stage& stage, std::int64_t pairs,
     for (const Stage& s : model_->stages()) flops += s.flops_per_pair;
     const double particles = double(clusters) / std::max<double>(1, double(layout_.lists().size())) * particles_.size();
     timers_.did(phase, double(pairs) * flops + particles * stage.flops_per_particle, particles * stage.bytes_per_particle);
-}
-
-// ---- guard and retry -----------------------------------------------------------------------------------------------
-
-void Simulation::remember_if_good(bool rebuilt)
-{
-    if (!options_.guard || !rebuilt) return;
-    if (clock_.step - clock_.inspected < 64) return;
-    timers_.timed(Phase::Guard, [&] {
-        clock_.inspected = clock_.step;
-        watch_.inspect(particles_, layout_, clock_, ledger());
-        remember();
-    });
-}
-
-void Simulation::remember()
-{
-    if (options_.guard && scene_.time.retry) last_good_ = SavedState{particles_, clock_, work_, domain_.known()};
-}
-
-bool Simulation::roll_back()
-{
-    if (!last_good_ || clock_.time <= last_failure_time_) return false;
-    last_failure_time_ = clock_.time;
-    particles_ = last_good_->particles;
-    clock_ = last_good_->clock;
-    work_ = last_good_->work;
-    clock_.base_time = clock_.time, clock_.base_step = clock_.step;
-    clock_.step_scale *= 0.5;
-    if (!start_scene_.events.empty()) {
-        enter_stage(clock_.time);
-        layout_.forget();
-        happened_.resize(std::size_t(clock_.events - events_before_));
-    }
-    // Cuts since then have moved blocks on, further than a rank knows.
-    domain_.restore_owners(last_good_->known);
-    domain_.migrate(particles_);
-    rebuild(false);
-    if (model_->moves_first()) clock_.next = step_length(scene_, clock_);
-    return true;
 }
 
 // ---- what a run tells of itself ------------------------------------------------------------------------------------
@@ -380,7 +355,8 @@ double Simulation::residual(const Ledger& l) const
     double drop = -l.state.potential;
     // After an event the potential may be that of other soil or gravity.
     if (clock_.events > 0)
-        drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.events), std::fabs(clock_.energy_at_start)});
+        drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.events), std::fabs(l.dissipated.moved_wall),
+                         std::fabs(clock_.energy_at_start)});
     const double scale =
         drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
     return scale > 0 ? excess / scale : 0;

@@ -111,7 +111,8 @@ private:
     void prepare();
     /// This rank's share of the soil at t = 0, where it is to be. Collective.
     void start_soil();
-    void rebuild(bool sort_anew, double way = 0);
+    /// `sort_anew`: at the places of now, which are those of a time (s); else at those of the last sort.
+    void rebuild(bool sort_anew, double time, double way = 0);
     StepInput step_input(double dt, double next);
     /// The forces of a state that no step led to, where steps need them first. Collective.
     void evaluate_anew();
@@ -129,6 +130,12 @@ private:
     StateEnergy state(const Scene&, double dt) const;
     void take(double joules);
     PassResult run_stages(const StepInput&);
+    /// Walls that move stand where they do at a time, s: for all but the model.
+    void move_walls(double time);
+    /// For the model too, half-way through the step under way or at its end.
+    void place_walls(const StepInput&, bool midway);
+    /// The largest way and speed of a wall in the step to come join those of particles: lists and the next step hold for both.
+    void meet_walls();
     Requests reduce(const PassResult&, Requests mine);
     /// How fast the whole scene flies past at a time (s): without walls the mean velocity of its bodies, falling with gravity.
     Vector frame(double time) const;
@@ -154,6 +161,7 @@ private:
     Domain domain_;
     Layout layout_;
     Balance balance_;
+    std::vector<int> moving_; // numbers of the walls that events move
     Watch watch_;
     WallForces wall_forces_;
     std::vector<Happened> happened_;

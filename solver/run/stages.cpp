@@ -2,6 +2,7 @@
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
 #include <numeric>
@@ -28,7 +29,7 @@ void Simulation::begin_events()
     }
     for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
     if (model_->moves_first()) evaluate_anew();
-    else rebuild(true);
+    else rebuild(true, clock_.time);
     require_room(scene_before);
     const double taken = before - ledger(clock_.next).sum(); // with the half kick to come before it, as at the start
     take(taken);
@@ -106,7 +107,7 @@ std::optional<Scene> Simulation::follow_courses(double dt)
     const auto order = scene::order_of_events(start_scene_);
     const bool goes_on = std::any_of(order.begin(), order.begin() + clock_.events, [&](int k) {
         const auto& e = start_scene_.events[std::size_t(k)];
-        return scene::lasting(e) && clock_.time < scene::end_of(e);
+        return scene::has_course(e) && clock_.time < scene::end_of(e);
     });
     if (!goes_on) return {};
     Scene before = scene_;
@@ -120,6 +121,39 @@ std::optional<Scene> Simulation::follow_courses(double dt)
 /// Forces of both ends of a step work in the mean: with D the displacements, (g0 + g1)/2 (D1 - D0), and the potential -g D changes by
 /// minus that and by -(g1 - g0) (D0 + D1)/2, which the event gives.
 void Simulation::end_course(const Scene& before) { take(0.5 * (state(before, clock_.dt).potential - state(scene_, clock_.dt).potential)); }
+
+void Simulation::move_walls(double time)
+{
+    for (const int w : moving_) scene_.walls[std::size_t(w)].pose = scene::pose_at(start_scene_, w, clock_.events, time);
+}
+
+void Simulation::place_walls(const StepInput& in, bool midway)
+{
+    const double begin = clock_.time, end = begin + in.dt;
+    std::vector<WallPlace> places(scene_.walls.size());
+    for (const int w : moving_) {
+        const auto pose = [&](double time) { return scene::pose_at(start_scene_, w, clock_.events, time); };
+        const scene::Pose back = scene::inverse(pose(clock_.sorted_time));
+        places[std::size_t(w)] = {scene::then(back, pose(begin)), scene::then(back, pose(end)), scene::then(back, pose(end + in.next))};
+    }
+    model_->place_walls({places, in.dt, in.next, midway});
+    if (!midway) move_walls(end);
+}
+
+void Simulation::meet_walls()
+{
+    for (const int w : moving_) {
+        const scene::Wall& wall = scene_.walls[std::size_t(w)];
+        if (!wall.present) continue;
+        const auto pose = [&](double time) { return scene::pose_at(start_scene_, w, clock_.events, time); };
+        const double end = clock_.time + clock_.next;
+        const double way = scene::farthest_way(wall.shape, pose(clock_.sorted_time), pose(end));
+        const auto motion = scene::motion_between(start_scene_, w, clock_.events, clock_.time, end);
+        const double speed = scene::largest_speed(wall.shape, pose(clock_.time), motion);
+        clock_.extremes.displacement2 = std::max(clock_.extremes.displacement2, way * way);
+        clock_.extremes.half_step_speed2 = std::max(clock_.extremes.half_step_speed2, speed * speed);
+    }
+}
 
 void Simulation::take(double joules)
 {

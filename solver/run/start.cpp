@@ -2,6 +2,7 @@
 #include "solver/run/blocks.hpp"
 #include "solver/run/initial_stress.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 
 namespace kuzure {
@@ -91,13 +92,14 @@ double energy_scale(const Scene& scene, const scene::Filling& filling, std::span
     double g = length(scene.effects.gravity.value_or(Vector{}));
     for (const auto& e : scene.events)
         if (e.gravity) g = std::max(g, length(*e.gravity));
+    const double shoved = scene::fastest_wall(scene);
     double scale = 0;
     for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
         const auto& body = scene.bodies[k];
         const Material& m = soils[body.soil];
         const double mass = m.density * scene.particle_volume() * double(filling.body_count(int(k)));
         const double size = std::max({b.high.x - b.low.x, b.high.z - b.low.z, scene.space.spacing});
-        scale += mass * (g * size + 0.5 * dot(body.velocity, body.velocity) + 1e-6 * m.c_p * m.c_p);
+        scale += mass * (g * size + 0.5 * (dot(body.velocity, body.velocity) + shoved * shoved) + 1e-6 * m.c_p * m.c_p);
     }
     return scale;
 }

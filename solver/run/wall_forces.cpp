@@ -5,6 +5,16 @@
 
 namespace kuzure {
 
+namespace {
+/// x of A x = b.
+Vector solved(const Stress& A, Vector b)
+{
+    const Vector u = scene::cross({A.xy, A.yy, A.yz}, {A.xz, A.yz, A.zz}), v = scene::cross({A.xz, A.yz, A.zz}, {A.xx, A.xy, A.xz}),
+                 w = scene::cross({A.xx, A.xy, A.xz}, {A.xy, A.yy, A.yz});
+    return (1 / (A.xx * u.x + A.xy * u.y + A.xz * u.z)) * Vector{dot(u, b), dot(v, b), dot(w, b)};
+}
+} // namespace
+
 std::vector<int> WallForces::named(const Scene& scene)
 {
     std::vector<int> walls;
@@ -26,18 +36,23 @@ template <class Visit> void WallForces::for_each_force(const Particles& p, Index
     const auto all = lists.walls(cluster);
     if (all.empty()) return;
     struct Seen {
-        int number;        // in walls_
+        int wall;
         double area = 0;   // of its kernel gradients
         Vector traction{}; // of the particle's stress on its faces
+        Stress bears{};    // of the directions in which its faces bear
     };
     std::vector<Seen> seen;
     const double support = scene_.support(), volume = scene_.particle_volume();
+    const auto grips = [&](int wall) { // it bears along its face too
+        const scene::Wall& w = scene_.walls[std::size_t(wall)];
+        return w.surface == scene::Surface::Rough || (w.surface == scene::Surface::Coulomb && w.friction_angle > 0);
+    };
     for (Index i = lists.first(cluster); i < lists.first(cluster) + lists.count(cluster); ++i) {
         const Vector a = p[field::wall_force][i];
         if (a == Vector{}) continue;
         const Vector x = p[field::position][i];
         const Vector force = (-soils_[std::size_t(p[field::soil][i])].density * volume) * a;
-        const bool alone = std::size_t(all[1]) + 2 == all.size();
+        const bool alone = std::size_t(all[1]) + 2 == all.size() && own_faces_[std::size_t(all[0])];
         if (alone) {
             if (const int k = number_of_[std::size_t(all[0])]; k >= 0) visit(std::size_t(k), x, force);
             continue;
@@ -46,44 +61,88 @@ template <class Visit> void WallForces::for_each_force(const Particles& p, Index
         const Stress sigma = p[field::stress][i];
         for (auto runs = all; !runs.empty(); runs = runs.subspan(2 + std::size_t(runs[1]))) {
             const WallPoints& w = layout_.walls()[std::size_t(runs[0])];
-            Seen here{number_of_[std::size_t(runs[0])]};
+            const auto& own = since_[std::size_t(runs[0])];
             for (const Index point : runs.subspan(2, std::size_t(runs[1]))) {
-                const Vector r = x - Vector{w.x[point], w.y[point], w.z[point]};
+                const Vector then{w.x[point], w.y[point], w.z[point]}, now = own ? scene::placed(*own, then) : then, r = x - now;
                 const double t = 1 - length(r) / support;
                 const auto& faces = faces_[std::size_t(runs[0])][std::size_t(point)];
                 if (!(t > 0) || faces.empty()) continue;
+                const auto of_now = [&](Face f) {
+                    const auto& moved = since_[std::size_t(f.wall)];
+                    if (!own && !moved) return f;
+                    const Vector foot = then + f.depth * f.normal;
+                    if (moved) f.normal = scene::turned(*moved, f.normal), f.side = scene::turned(*moved, f.side);
+                    f.depth = dot((moved ? scene::placed(*moved, foot) : foot) - now, f.normal);
+                    return f;
+                };
                 // the first face in front of which the particle lies, as in the pair loop
-                const auto in_front = std::ranges::find_if(faces, [&](const Face& f) { return f.depth < dot(r, f.normal); });
-                const Face& face = in_front == faces.end() ? faces.back() : *in_front;
+                const auto in_front = std::ranges::find_if(faces, [&](const Face& f) {
+                    const Face here = of_now(f);
+                    return here.depth < dot(r, here.normal);
+                });
+                const Face face = of_now(in_front == faces.end() ? faces.back() : *in_front);
                 const Vector gradient = (t * t * t) * r, push = sigma * gradient;
                 const bool rough = scene_.walls[std::size_t(face.wall)].surface == scene::Surface::Rough;
-                here.area += length(gradient);
-                here.traction = here.traction + (rough ? push : dot(push, face.normal) * face.normal);
+                const Vector n = face.normal, all_of_it = rough ? push : dot(push, n) * n, its = own_share(face, all_of_it);
+                const Vector bearing = face.side;
+                const auto feels = [&](int wall, Vector force, Stress bears) {
+                    auto here = std::ranges::find(seen, wall, &Seen::wall);
+                    if (here == seen.end()) here = seen.insert(here, {wall});
+                    here->area += length(gradient), here->traction = here->traction + force;
+                    here->bears = here->bears + length(gradient) * bears;
+                };
+                const Stress all_ways{1, 1, 1, 0, 0, 0}, along{bearing.x * bearing.x, bearing.y * bearing.y, bearing.z * bearing.z,
+                                                               bearing.x * bearing.y, bearing.y * bearing.z, bearing.x * bearing.z};
+                const bool grip = grips(face.wall), edge = face.wall != runs[0] && its != all_of_it;
+                // A point may stand behind a face of another wall, which is the one that feels it; at an edge both do.
+                feels(face.wall, edge ? its : all_of_it, grip ? all_ways : along);
+                if (edge) feels(runs[0], all_of_it - its, grip ? all_ways : all_ways - along);
             }
-            if (here.area > 0) seen.push_back(here);
+        }
+        if (seen.size() == 1) {
+            if (const int k = number_of_[std::size_t(seen[0].wall)]; k >= 0) visit(std::size_t(k), x, force);
+            continue;
         }
         Vector together{};
         double sight = 0;
         for (const auto& s : seen) together = together + s.traction, sight += s.area;
         const double square = dot(together, together), scale = square > 0 ? dot(force, together) / square : 0;
         const Vector rest = force - scale * together;
+        Stress all_bear{};
+        for (const auto& s : seen) all_bear = all_bear + s.bears;
+        const Vector loads = solved(plus_isotropic(all_bear, 1e-9 * sight), rest);
+        const Vector left = rest - all_bear * loads; // what none of them can bear
         for (const auto& s : seen)
-            if (s.number >= 0) visit(std::size_t(s.number), x, scale * s.traction + (s.area / sight) * rest);
+            if (const int k = number_of_[std::size_t(s.wall)]; k >= 0)
+                visit(std::size_t(k), x, scale * s.traction + s.bears * loads + (s.area / sight) * left);
+    }
+}
+
+void WallForces::place_walls()
+{
+    for (std::size_t w = 0; w < since_.size(); ++w) {
+        const scene::Pose& now = scene_.walls[w].pose;
+        if (now == poses_[w]) since_[w].reset();
+        else since_[w] = scene::then(scene::inverse(poses_[w]), now);
     }
 }
 
 void WallForces::renew_faces()
 {
-    if (faces_of_ == layout_.wall_renewals()) return;
+    if (!any() || faces_of_ == layout_.wall_renewals()) return;
     faces_of_ = layout_.wall_renewals();
+    poses_.clear(), since_.assign(scene_.walls.size(), {});
+    for (const auto& w : scene_.walls) poses_.push_back(w.pose);
     const WallSurface surface(scene_);
-    faces_.assign(layout_.walls().size(), {});
+    faces_.assign(layout_.walls().size(), {}), own_faces_.assign(faces_.size(), true);
     for (std::size_t w = 0; w < faces_.size(); ++w) {
         const WallPoints& points = layout_.walls()[w];
         const Index n = Index(points.x.size());
         faces_[w].resize(std::size_t(n));
 #pragma omp parallel for schedule(dynamic, 256)
         for (Index k = 0; k < n; ++k) surface.faces({points.x[k], points.y[k], points.z[k]}, scene_.support(), faces_[w][std::size_t(k)]);
+        own_faces_[w] = std::ranges::all_of(
+            faces_[w], [&](const auto& of) { return std::ranges::all_of(of, [&](const Face& f) { return f.wall == int(w); }); });
     }
 }
 
@@ -94,11 +153,11 @@ double WallForces::impulse_unit(const Clock& clock) const
     return std::exp2(std::floor(std::log2(clock.energy_unit / scene_.space.spacing * scene::crossing_time(scene_))));
 }
 
-void WallForces::add_impulse(const Particles& p, double seconds, Clock& clock)
+bool WallForces::add_impulse(const Particles& p, double seconds, Clock& clock)
 {
-    if (!any() || !layout_.built()) return;
-    renew_faces();
+    if (!any() || !layout_.built()) return true;
     clock.impulse.resize(walls_.size());
+    place_walls();
     const double per_unit = seconds / impulse_unit(clock);
     const Index clusters = layout_.lists().size();
     bool outgrown = false;
@@ -121,15 +180,14 @@ void WallForces::add_impulse(const Particles& p, double seconds, Clock& clock)
             outgrown = outgrown || too_large;
         }
     }
-    // What no wall can bear is found by the guard, which says more.
-    if (outgrown) clock.extremes.not_finite = 1;
+    return !outgrown;
 }
 
 std::vector<WallLoad> WallForces::loads(const Team& team, const Particles& p, const Clock& clock)
 {
     std::vector<WallLoad> all;
     if (!any()) return all;
-    renew_faces();
+    place_walls();
     auto impulse = clock.impulse;
     impulse.resize(walls_.size());
     team.sum(std::span<std::int64_t>(impulse.front().data(), 3 * impulse.size()));

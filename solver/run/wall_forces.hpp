@@ -22,18 +22,21 @@ public:
     /// The walls of the scene that have names, in its order; none where the scheme does not tell their forces.
     static std::vector<int> named(const Scene&);
     bool any() const { return !walls_.empty(); }
-    /// Adds what the present forces do in so many seconds on this rank. Throws NumbersFailed where it outgrows its unit.
-    void add_impulse(const Particles&, double seconds, Clock&);
+    /// The faces behind which the wall points lie, where the walls near this rank are other ones than before. Call it after lists were
+    /// made, with the walls of the scene as they stood then.
+    void renew_faces();
+    /// Adds what the present forces do in so many seconds on this rank; false where it outgrows its unit.
+    bool add_impulse(const Particles&, double seconds, Clock&);
     /// Collective. `impulse` as in the clock of this rank.
     std::vector<WallLoad> loads(const Team&, const Particles&, const Clock&);
 
 private:
     /// visit(number in walls_, place, force on the wall) for every particle of a cluster and every named wall in its reach. A particle in
     /// reach of several walls is shared among them by what its stress does to the faces of each, as the pair loop has it; the rest, of
-    /// viscosity and friction, by how much it sees of each.
+    /// viscosity and friction, by how much it sees of each and which way that can bear.
     template <class Visit> void for_each_force(const Particles&, Index cluster, Visit visit) const;
-    /// The faces behind which the wall points lie, where the walls near this rank are other ones than before.
-    void renew_faces();
+    /// Walls that move are where the scene has them now.
+    void place_walls();
     double impulse_unit(const Clock&) const;
 
     const Scene& scene_;
@@ -42,6 +45,9 @@ private:
     std::vector<int> walls_;                            // those with names
     std::vector<int> number_of_;                        // of each wall in walls_, -1 for one without a name
     std::vector<std::vector<std::vector<Face>>> faces_; // of each point of each wall
+    std::vector<scene::Pose> poses_;                    // of each wall, for which faces_ are
+    std::vector<std::optional<scene::Pose>> since_;     // of each wall that has moved since
+    std::vector<bool> own_faces_;                       // of each wall: none of its points stands behind a face of another
     std::int64_t faces_of_ = -1;                        // Layout::wall_renewals() for which they are
 };
 

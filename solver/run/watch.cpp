@@ -3,6 +3,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/scene/events.hpp"
 #include "solver/scene/height_field.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
 #include <limits>
@@ -59,7 +60,7 @@ Neighbourhoods inspect_neighbours(const Team& team, const Scene& scene, std::int
                 my_clumped += near > 1; // every particle meets itself
                 my_crowded.meet((neighbours - 1) / lattice, id[i]);
                 for (auto walls = lists.walls(c); !walls.empty(); walls = walls.subspan(2 + walls[1]))
-                    my_sunk.meet(-scene::contact(scene.walls[walls[0]].shape, at, scene.dimensions).distance / dx, id[i]);
+                    my_sunk.meet(-scene::contact(scene.walls[walls[0]], at, scene.dimensions).distance / dx, id[i]);
             }
 #pragma omp critical
         {
@@ -192,7 +193,7 @@ std::string Watch::nearest_wall(const Particles& p, std::int64_t id) const
         if (p[field::id][i] != id) continue;
         for (std::size_t w = 0; w < scene_.walls.size(); ++w)
             if (!scene_.walls[w].present) continue;
-            else if (const double d = scene::signed_distance(scene_.walls[w].shape, p[field::position][i], scene_.dimensions); d < nearest)
+            else if (const double d = scene::signed_distance(scene_.walls[w], p[field::position][i], scene_.dimensions); d < nearest)
                 nearest = d, wall = std::int64_t(w);
     }
     const std::int64_t found = comm_.max(wall);

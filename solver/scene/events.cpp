@@ -1,4 +1,5 @@
 #include "solver/scene/events.hpp"
+#include "solver/scene/motion.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -61,36 +62,17 @@ template <class Parts> int named(const Parts& parts, const std::string& name)
     const auto found = std::ranges::find(parts, name, [](const auto& part) { return part.name; });
     return name.empty() || found == parts.end() ? -1 : int(found - parts.begin());
 }
-void set_present(Scene& s, const std::string& name, bool there)
-{
-    if (const int b = named(s.bodies, name); b >= 0) s.bodies[std::size_t(b)].present = there;
-    if (const int w = named(s.walls, name); w >= 0) s.walls[std::size_t(w)].present = there;
-}
-
 double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 
-/// What an event changes, as keys: two that share one at a time contradict each other.
-std::set<std::string> touched(const Event& e)
-{
-    std::set<std::string> keys;
-    for (const auto& name : e.add) keys.insert("\"" + name + "\"");
-    for (const auto& name : e.remove) keys.insert("\"" + name + "\"");
-    if (e.gravity) keys.insert("gravity");
-    if (e.shaking.rows) keys.insert("shaking");
-    if (!e.water.empty()) keys.insert("water");
-    if (e.damping) keys.insert("damping");
-    for (const auto& c : e.soils) {
-        const auto add = [&](bool there, const char* key) {
-            if (there) keys.insert(fmt::format("soil {}.{}", c.soil, key));
-        };
-        add(c.young || c.stiffness, "young"), add(c.poisson.has_value(), "poisson"), add(c.cohesion || c.strength, "cohesion");
-        add(c.friction_angle || c.strength, "friction_angle"), add(c.dilation_angle || c.strength, "dilation_angle");
-        add(c.tension_cutoff || c.strength, "tension_cutoff"), add(c.cone.has_value(), "cone");
-    }
-    return keys;
-}
-
 } // namespace
+
+int body_named(const Scene& s, const std::string& name) { return named(s.bodies, name); }
+int wall_named(const Scene& s, const std::string& name) { return named(s.walls, name); }
+void set_present(Scene& s, const std::string& name, bool there)
+{
+    if (const int b = body_named(s, name); b >= 0) s.bodies[std::size_t(b)].present = there;
+    if (const int w = wall_named(s, name); w >= 0) s.walls[std::size_t(w)].present = there;
+}
 
 bool GroundMotion::operator==(const GroundMotion& o) const { return rows == o.rows || (rows && o.rows && *rows == *o.rows); }
 
@@ -148,6 +130,7 @@ Scene stage_of(const Scene& start, int begun, double time)
         }
         if (e.shaking.rows) shaken = shaken + acceleration(*e.shaking.rows, time - begin_of(e));
     }
+    for (const int w : moving_walls(start)) now.walls[std::size_t(w)].pose = pose_at(start, w, begun, time);
     // Seen from ground that moves, soil feels its acceleration the other way.
     if (shaken != Vector{}) now.effects.gravity = now.effects.gravity.value_or(Vector{}) - shaken;
     return now;
@@ -210,7 +193,7 @@ std::string time_in_words(const Event& e)
 std::string in_words(const Scene& s, const Event& e)
 {
     std::vector<std::string> parts;
-    const auto piece = [&](const std::string& name) { return (named(s.bodies, name) >= 0 ? "body " : "wall ") + name; };
+    const auto piece = [&](const std::string& name) { return (body_named(s, name) >= 0 ? "body " : "wall ") + name; };
     for (const auto& name : e.remove) parts.push_back(piece(name) + " is removed");
     for (const auto& name : e.add) parts.push_back(piece(name) + " is added");
     for (const auto& c : e.soils) {
@@ -229,185 +212,17 @@ std::string in_words(const Scene& s, const Event& e)
     if (e.gravity) parts.push_back(fmt::format("gravity [{:.6g} {:.6g} {:.6g}] m/s^2", e.gravity->x, e.gravity->y, e.gravity->z));
     if (e.shaking.rows) parts.push_back(fmt::format("the ground shakes ({} rows of {})", e.shaking.rows->size(), e.shaking.file));
     if (!e.water.empty()) parts.push_back(fmt::format("a water table of {} corners", e.water.size()));
+    if (e.move) {
+        const WallMove& m = *e.move;
+        std::string how;
+        if (m.velocity != Vector{}) how = fmt::format(" by [{:.6g} {:.6g} {:.6g}] m/s", m.velocity.x, m.velocity.y, m.velocity.z);
+        if (m.turn)
+            how += fmt::format("{} turning by {:.6g} deg/s about [{:.6g} {:.6g} {:.6g}]", how.empty() ? "" : " and", degrees(m.turn->rate),
+                               m.turn->center.x, m.turn->center.y, m.turn->center.z);
+        parts.push_back(fmt::format("wall {} moves{}", m.wall, how));
+    }
     if (e.damping) parts.push_back(*e.damping > 0 ? fmt::format("damping {:.6g} of critical", *e.damping) : std::string("no damping"));
     return fmt::format("{}", fmt::join(parts, "; "));
-}
-
-// ---- rules ----
-
-namespace {
-
-void check_names(const Scene& s, Issues& issues)
-{
-    std::map<std::string, std::string> keys; // by name
-    const auto meet = [&](const std::string& name, const std::string& key) {
-        if (name.empty()) return;
-        if (name.find_first_of(",;\"\\") != name.npos)
-            issues.push_back({Severity::Error,
-                              key + ".name",
-                              fmt::format("expected a name without commas, semicolons, quotes and backslashes, found {}", name),
-                              {}});
-        const auto [first, fresh] = keys.emplace(name, key);
-        if (!fresh)
-            issues.push_back({Severity::Error, key + ".name",
-                              fmt::format("expected a name that no other wall or body has, found \"{}\" again; rename one", name),
-                              first->second + ".name"});
-    };
-    for (std::size_t b = 0; b < s.bodies.size(); ++b) meet(s.bodies[b].name, fmt::format("body.{}", b));
-    for (std::size_t w = 0; w < s.walls.size(); ++w) meet(s.walls[w].name, fmt::format("wall.{}", w));
-
-    std::map<std::string, std::string> probes;
-    for (std::size_t k = 0; k < s.probes.size(); ++k) {
-        const Probe& p = s.probes[k];
-        const std::string key = fmt::format("probe.{}", k);
-        const int said = p.point.has_value() + p.particle.has_value() + !p.body.empty();
-        if (said != 1)
-            issues.push_back({Severity::Error,
-                              key,
-                              fmt::format("expected exactly one of point, particle, body, found {}; give each its own [[probe]]", said),
-                              {}});
-        if (!p.body.empty() && named(s.bodies, p.body) < 0)
-            issues.push_back({Severity::Error,
-                              key + ".body",
-                              fmt::format("expected the name of a body, found \"{}\"; give that [[body]] a name", p.body),
-                              {}});
-        const std::string name = p.name.empty() ? std::to_string(k) : p.name;
-        if (name.find_first_of(",;\"\\") != name.npos)
-            issues.push_back({Severity::Error,
-                              key + ".name",
-                              fmt::format("expected a name without commas, semicolons, quotes and backslashes, found {}", name),
-                              {}});
-        if (!probes.emplace(name, key).second)
-            issues.push_back({Severity::Error, key + ".name",
-                              fmt::format("expected a name that no other probe has, found \"{}\" again", name), probes[name]});
-    }
-}
-
-/// What an event says of itself.
-void check_event(const Scene& s, const Event& e, const std::string& key, Issues& issues)
-{
-    const auto error = [&](const std::string& where, std::string text) {
-        issues.push_back({Severity::Error, where.empty() ? key : key + "." + where, std::move(text), {}});
-    };
-    if (e.at.has_value() == (e.from || e.to) || e.from.has_value() != e.to.has_value())
-        return error("", "expected either at, or from and to; write, for example, at = 2.0");
-    if (e.from && !(*e.from < *e.to)) return error("to", fmt::format("expected from < to, found {} and {}; exchange them", *e.from, *e.to));
-    if (touched(e).empty()) error("", "expected something that changes, found nothing; write, for example, remove = \"gate\"");
-    if (begin_of(e) >= s.time.end)
-        issues.push_back({Severity::Warning,
-                          key,
-                          fmt::format("it comes at t = {:.6g} s and the run ends at {:.6g} s: it does not happen before time.end is raised",
-                                      begin_of(e), s.time.end),
-                          {}});
-    const bool slowly = e.from.has_value();
-    const auto at_once = [&](bool there, const char* what) {
-        if (slowly && there) error(what, fmt::format("expected at = ... for {}, which happens at once, found from and to", what));
-    };
-    at_once(!e.add.empty(), "add"), at_once(!e.remove.empty(), "remove"), at_once(e.damping.has_value(), "damping");
-    at_once(bool(e.shaking.rows), "shaking");
-    for (const auto* names : {&e.add, &e.remove})
-        for (const auto& name : *names) {
-            if (named(s.bodies, name) >= 0 || named(s.walls, name) >= 0) continue;
-            std::vector<std::string> all;
-            for (const auto& b : s.bodies)
-                if (!b.name.empty()) all.push_back(b.name);
-            for (const auto& w : s.walls)
-                if (!w.name.empty()) all.push_back(w.name);
-            error(
-                names == &e.add ? "add" : "remove",
-                fmt::format("expected the name of a wall or body, found \"{}\"; the names here: {}", name,
-                            all.empty() ? std::string("none; give that wall a name = \"...\"") : fmt::format("{}", fmt::join(all, ", "))));
-        }
-    for (const auto& name : e.add)
-        if (const int b = named(s.bodies, name); b >= 0 && s.bodies[std::size_t(b)].stress == InitialStress::AtRest)
-            error("add", fmt::format("expected a body without stress, found {} \"at rest\": soil that is added carries nothing yet; let "
-                                     "its stress be \"none\" and add it in thin lifts",
-                                     name));
-    if (!e.water.empty()) {
-        if (!s.effects.pore_pressure)
-            error("water", "expected a scene with still water, found none; write effects.pore_pressure = { table = [[0.0, -1.0]] } below "
-                           "the soil to begin without");
-        else if (slowly && s.effects.pore_pressure->table.size() != e.water.size())
-            error("water", fmt::format("expected as many corners as the table before, {}, to move one by one, found {}",
-                                       s.effects.pore_pressure->table.size(), e.water.size()));
-    }
-    if (e.shaking.rows && s.effects.pore_pressure)
-        error("shaking", "expected no pore water where the ground shakes: water that does not flow has no answer to it; leave one out");
-    for (const auto& c : e.soils) {
-        const bool known = c.soil >= 0 && std::size_t(c.soil) < s.soils.size();
-        if (!known) continue; // the reader has said so
-        const std::string soil = "soil." + s.soils[std::size_t(c.soil)].name;
-        if (c.stiffness && c.young) error(soil, "expected young or stiffness, found both; leave one");
-        if (c.strength && (c.cohesion || c.friction_angle || c.tension_cutoff || c.dilation_angle))
-            error(soil, "expected strength or its parts, found both; leave one");
-        if (slowly && c.cone) error(soil + ".cone", "expected at = ... for a cone, which changes at once, found from and to");
-        if (slowly && c.tension_cutoff && !s.soils[std::size_t(c.soil)].tension_cutoff)
-            error(soil + ".tension_cutoff", "expected a soil with a tension_cutoff to start from, found none; give it one, or at = ...");
-    }
-}
-
-/// What events say of each other.
-void check_order(const Scene& s, Issues& issues)
-{
-    const auto key = [](int k) { return fmt::format("event.{}", k); };
-    const auto order = order_of_events(s);
-    for (std::size_t i = 0; i < order.size(); ++i)
-        for (std::size_t j = i + 1; j < order.size(); ++j) {
-            const Event &a = s.events[std::size_t(order[i])], &b = s.events[std::size_t(order[j])];
-            const bool apart = end_of(a) < begin_of(b) || (end_of(a) == begin_of(b) && end_of(a) > begin_of(a));
-            if (apart) continue;
-            const auto both = touched(a);
-            for (const auto& what : touched(b))
-                if (both.contains(what)) {
-                    issues.push_back({Severity::Error, key(order[j]),
-                                      fmt::format("expected one event at a time for {}, found another {} and this one {}; move one of them",
-                                                  what, time_in_words(a), time_in_words(b)),
-                                      key(order[i])});
-                    break;
-                }
-        }
-    Scene now = s;
-    const auto present = [&](const std::string& name) {
-        if (const int b = named(now.bodies, name); b >= 0) return now.bodies[std::size_t(b)].present;
-        const int w = named(now.walls, name);
-        return w >= 0 && now.walls[std::size_t(w)].present;
-    };
-    const auto no_soil = [&] { return std::ranges::none_of(now.bodies, [](const Body& b) { return b.present; }); };
-    if (no_soil() && !s.bodies.empty())
-        issues.push_back({Severity::Error, "event", "expected soil at the start, found that every body is added later; leave one out", {}});
-    for (const int k : order) {
-        const Event& e = s.events[std::size_t(k)];
-        std::set<std::string> here;
-        for (const auto* names : {&e.remove, &e.add})
-            for (const auto& name : *names) {
-                const bool removes = names == &e.remove;
-                if (named(s.bodies, name) < 0 && named(s.walls, name) < 0) continue;
-                if (!here.insert(name).second)
-                    issues.push_back(
-                        {Severity::Error, key(k), fmt::format("expected each name once in an event, found {} again", name), {}});
-                else if (present(name) != removes)
-                    issues.push_back({Severity::Error,
-                                      key(k) + (removes ? ".remove" : ".add"),
-                                      fmt::format("expected what {} there then, found {}, which is {}", removes ? "is" : "is not", name,
-                                                  removes ? "gone already" : "there already"),
-                                      {}});
-                set_present(now, name, !removes);
-            }
-        if (no_soil())
-            issues.push_back({Severity::Error, key(k) + ".remove", "expected some soil to be left, found none; leave a body", {}});
-    }
-}
-
-} // namespace
-
-void check_names_and_events(const Scene& s, Issues& issues)
-{
-    check_names(s, issues);
-    const auto before = issues.size();
-    for (std::size_t k = 0; k < s.events.size(); ++k) check_event(s, s.events[k], fmt::format("event.{}", k), issues);
-    const bool sound =
-        std::all_of(issues.begin() + std::ptrdiff_t(before), issues.end(), [](const Issue& i) { return i.severity != Severity::Error; });
-    if (sound) check_order(s, issues);
 }
 
 } // namespace kuzure::scene

@@ -12,6 +12,8 @@ double begin_of(const Event&);
 double end_of(const Event&);
 /// True where something goes on after an event has begun.
 bool lasting(const Event&);
+/// True where, beside walls that move, something changes little by little.
+bool has_course(const Event&);
 /// Numbers of the events in the order in which they begin, those of one time as in the file.
 std::vector<int> order_of_events(const Scene&);
 /// The first time after `time` (s) at which an event begins or ends; infinite where there is none.
@@ -19,6 +21,11 @@ double next_event_after(const Scene&, double time);
 
 /// The scene at `time` (s) once the first `begun` events of their order have begun. `start`: the scene at its start.
 Scene stage_of(const Scene& start, int begun, double time);
+/// Number of the body or wall with a name; -1 where there is none.
+int body_named(const Scene&, const std::string& name);
+int wall_named(const Scene&, const std::string& name);
+/// Puts it there, or takes it away.
+void set_present(Scene&, const std::string& name, bool there);
 /// Bodies and walls that an event adds before one removes them are not there at the start.
 void resolve_presence(Scene&);
 /// Times (s) from which and to which a body or wall of this name is there; all time where it has none.

@@ -197,6 +197,12 @@ public:
         for (std::size_t w = n_bodies_; w < points_.size(); ++w)
             points_[w].for_each_in(region, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x, int(w - n_bodies_)); });
     }
+    /// Calls visit(std::int64_t id, Vector x) for all particles of one wall as it is drawn, by rising id.
+    template <class Visit> void for_each_of_wall(int wall, Visit visit) const
+    {
+        const Points& points = points_[n_bodies_ + std::size_t(wall)];
+        for (std::int64_t k = 0; k < points.size(); ++k) visit(first_id_[n_bodies_ + std::size_t(wall)] + k, points.position(k));
+    }
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;
     std::int64_t wall_count_in(const Box& region) const;

@@ -2,7 +2,7 @@
 // The parts of a scene that the pair loop is made from: shapes, matter, effects, in SI units and radians. An effect is on
 // exactly when its optional has a value, after resolve() has decided what the file left to "auto". Kept apart from Scene,
 // whose other keys (output, time, accuracy) may change without compiling the kernels again.
-#include "solver/core/tensor.hpp"
+#include "solver/scene/pose.hpp"
 #include <array>
 #include <memory>
 #include <optional>
@@ -120,6 +120,7 @@ struct Wall {
     double friction_angle = 0; // rad, for Coulomb
     std::string name = {};     // empty: none
     bool present = true;       // as of a body
+    Pose pose = {};            // where events have moved it
     bool operator==(const Wall&) const = default;
 };
 

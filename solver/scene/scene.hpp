@@ -90,6 +90,19 @@ struct GroundMotion {
     std::shared_ptr<const std::vector<std::array<double, 4>>> rows;
     bool operator==(const GroundMotion&) const; // by its rows
 };
+/// A turn about a line through `center`, which moves along, m; `axis` need not be of unit length; rad/s.
+struct Turn {
+    Vector center{}, axis{0, 1, 0};
+    double rate = 0;
+    bool operator==(const Turn&) const = default;
+};
+/// How an event moves a wall as long as it lasts, m/s.
+struct WallMove {
+    std::string wall; // its name
+    Vector velocity{};
+    std::optional<Turn> turn;
+    bool operator==(const WallMove&) const = default;
+};
 /// A change of the scene while it runs: at one time, or linearly from one to another. What is absent stays as it was.
 struct Event {
     std::optional<double> at, from, to;       // s; at alone, or from and to
@@ -99,6 +112,7 @@ struct Event {
     std::vector<std::array<double, 2>> water; // x, z in m, the new water table; empty: as it was
     std::optional<double> damping;            // of critical, 1; 0: none
     std::vector<SoilChange> soils;
+    std::optional<WallMove> move;
     bool operator==(const Event&) const = default;
 };
 /// A row a time in probes.csv: of a place, of one particle or of the mean of a body.

@@ -8,6 +8,8 @@
 //
 // the force's power v . f equals -sigma : L, so that a fixed wall neither gives nor takes energy. Rough: P = 1; smooth and Coulomb:
 // P = n (x) n. Coulomb's friction is a traction of its own (friction.hpp).
+// Where a wall moves, v_i - v_w takes the place of v_i, v_w the velocity of the surface: the force's power is then -sigma : L and that of
+// the wall, f . v_w, which is booked apart (moved_wall).
 #include "solver/core/memory.hpp"
 #include "solver/pairs/cluster.hpp"
 #include "solver/scene/parts.hpp"
@@ -24,12 +26,17 @@ template <class T> struct FaceRecord {
     T last;    // 1 for the last face of its point
     T holds;   // 1 where sunk soil is held out: real ground
 };
+/// How the surface moves there, m/s: in this step, and in the step to come.
+template <class T> struct FaceMotion {
+    T vx, vy, vz, next_x, next_y, next_z;
+};
 
 /// Points of one wall as the pair loop reads them, and the faces of each.
 template <class T> struct WallRecords {
     Array<Coordinate<T>> x, y, z;
     std::vector<Index> first; // of each point in `faces`
     std::vector<FaceRecord<T>> faces;
+    std::vector<FaceMotion<T>> motion; // of each face, where walls move; else empty
 };
 
 /// What the lanes of a cluster see of one wall point.
@@ -37,7 +44,8 @@ template <class V> struct Mirror {
     Vec3<V> normal;
     V factor; // (v_i - v_j)/v_i of what is mirrored
     V stick, coulomb, tangent;
-    V sunk; // of the particle behind the face where sunk soil is held out, in the unit of the pair sums; else 0
+    Vec3<V> v{}, next{}; // of the surface, m/s, in this step and in the one to come; only where walls move
+    V sunk;              // of the particle behind the face where sunk soil is held out, in the unit of the pair sums; else 0
 };
 
 /// Law: a wall point moves as the particle's mirror image, v_j = -v_i of what is mirrored, f = 2. Summed over the particles on one side and
@@ -47,19 +55,27 @@ struct MirrorImage {
     template <class V> KUZURE_INLINE V factor(V, V) const { return V(number<V>(2)); }
 };
 
-/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
-template <class Law, class V, class T> KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face)
+/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest. `motion`: of the faces, where walls
+/// move.
+template <bool moving, class Law, class V, class T>
+KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceMotion<T>* motion)
 {
     const auto of = [&](const FaceRecord<T>& f) {
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
         const V along = dot(r, n), depth(f.depth);
-        return Mirror<V>{n, law.factor(along, depth), V(f.stick), V(f.coulomb), V(f.tangent), V(f.holds) * max(depth - along, V(T(0)))};
+        Mirror<V> m{n, law.factor(along, depth), V(f.stick), V(f.coulomb), V(f.tangent), {}, {}, V(f.holds) * max(depth - along, V(T(0)))};
+        if constexpr (moving) {
+            m.v = {V(motion->vx), V(motion->vy), V(motion->vz)};
+            m.next = {V(motion->next_x), V(motion->next_y), V(motion->next_z)};
+        }
+        return m;
     };
     Mirror<V> m = of(*face);
     if (face->last != T(0)) return m;
     V settled = select(less(V(face->depth), dot(r, m.normal)), V(T(1)), V(T(0)));
     do {
         ++face;
+        if constexpr (moving) ++motion;
         const Mirror<V> next = of(*face);
         const V take = select(less(V(face->depth), dot(r, next.normal)), V(T(1)) - settled, V(T(0)));
         const auto use = less(V(T(0.5)), take);
@@ -67,6 +83,10 @@ template <class Law, class V, class T> KUZURE_INLINE Mirror<V> mirror(const Law&
         m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
         m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
         m.sunk = select(use, next.sunk, m.sunk);
+        if constexpr (moving) {
+            m.v = {select(use, next.v.x, m.v.x), select(use, next.v.y, m.v.y), select(use, next.v.z, m.v.z)};
+            m.next = {select(use, next.next.x, m.next.x), select(use, next.next.y, m.next.y), select(use, next.next.z, m.next.z)};
+        }
         settled = settled + take;
     } while (face->last == T(0));
     return m;

@@ -1,5 +1,6 @@
 #include "solver/walls/surface.hpp"
 #include "solver/scene/height_field.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <limits>
@@ -79,15 +80,22 @@ WallSurface::WallSurface(const Scene& scene) : scene_(scene), dimensions_(scene.
     const int px = s.periodic[0], py = s.periodic[1], pz = s.periodic[2];
     for (int w = 0; w < int(scene.walls.size()); ++w) {
         if (!scene.walls[w].present) continue;
-        auto b = scene::bounds(scene.walls[w].shape);
+        auto b = scene::bounds(scene.walls[w]);
+        const bool moved = scene.walls[w].pose != scene::Pose{};
         if (dimensions_ == 2) b.low.y = -std::numeric_limits<double>::infinity(), b.high.y = std::numeric_limits<double>::infinity();
         for (int i = -px; i <= px; ++i)
             for (int j = -py; j <= py; ++j)
                 for (int k = -pz; k <= pz; ++k) {
                     const Vector shift{i * period.x, j * period.y, k * period.z};
-                    parts_.push_back({w, shift, {b.low + shift, b.high + shift}});
+                    parts_.push_back({w, shift, {b.low + shift, b.high + shift}, moved});
                 }
     }
+}
+
+Vector WallSurface::as_drawn(const Part& part, Vector x) const
+{
+    const Vector unshifted = x - part.shift;
+    return part.moved ? scene::as_drawn(scene_.walls[part.wall].pose, unshifted) : unshifted;
 }
 
 bool WallSurface::covered(Vector x) const
@@ -96,7 +104,7 @@ bool WallSurface::covered(Vector x) const
         const auto &lo = part.bounds.low, &hi = part.bounds.high;
         if (x.x < lo.x || x.z < lo.z || x.x > hi.x || x.z > hi.z || x.y < lo.y || x.y > hi.y) continue;
         // What touches covers: flush shapes leave no gap, whatever their last digits.
-        if (scene::signed_distance(scene_.walls[part.wall].shape, x - part.shift, dimensions_) < 0) return true;
+        if (scene::signed_distance(scene_.walls[part.wall].shape, as_drawn(part, x), dimensions_) < 0) return true;
     }
     return false;
 }
@@ -131,7 +139,8 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
         if (point.x < lo.x - reach || point.z < lo.z - reach || point.x > hi.x + reach || point.z > hi.z + reach ||
             point.y < lo.y - reach || point.y > hi.y + reach)
             continue;
-        const Vector x = point - part.shift;
+        const Vector x = as_drawn(part, point);
+        const scene::Pose& pose = scene_.walls[part.wall].pose;
         std::visit(
             [&](const auto& shape) {
                 for_each_face(shape, x, dimensions_, [&](const Candidate& c) {
@@ -142,16 +151,20 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
                     const bool straight = away - along <= tolerance_;
                     const double depth = straight ? along : away;
                     if (depth > reach) return;
-                    const Vector normal = straight ? c.normal : (1 / depth) * way;
+                    Vector normal = straight ? c.normal : (1 / depth) * way;
                     if (depth > tolerance_ && dot(way, normal) < 0) return; // the face of another wall, seen from behind
-                    if (covered(c.point + part.shift + tolerance_ * normal)) return;
-                    if (!straight && continued(c.point + part.shift, normal)) return;
+                    Vector foot = c.point, side = c.normal;
+                    if (part.moved)
+                        normal = scene::turned(pose, normal), side = scene::turned(pose, side), foot = scene::placed(pose, foot);
+                    foot = foot + part.shift;
+                    if (covered(foot + tolerance_ * normal)) return;
+                    if (!straight && continued(foot, normal)) return;
                     for (Face& f : found)
                         if (std::fabs(f.depth - depth) <= tolerance_ && dot(f.normal, normal) > 1 - 1e-9) {
-                            if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall;
+                            if (grip(scene_.walls[part.wall]) > grip(scene_.walls[f.wall])) f.wall = part.wall, f.side = side;
                             return;
                         }
-                    found.push_back({normal, depth, part.wall});
+                    found.push_back({normal, depth, part.wall, side});
                 });
             },
             scene_.walls[part.wall].shape);

@@ -11,7 +11,21 @@ struct Face {
     Vector normal; // out of the wall
     double depth;  // m
     int wall;      // whose contact counts
+    Vector side;   // normal of that wall's own face: at an edge, where another wall goes on, not the tangent plane's
+    /// Where it touches the surface, seen from the point x, m.
+    Vector foot(Vector x) const { return x + depth * normal; }
 };
+/// What of a force on a face the wall of the face feels; the rest is felt by the wall of the point behind it, if that is another.
+inline Vector own_share(const Face& f, Vector force) { return dot(f.side, f.normal) > 1 - 1e-9 ? force : dot(force, f.side) * f.side; }
+/// Velocity of a face from those of walls, velocity(wall, place); x: the point behind it, of the wall `own`. At an edge between two walls
+/// each counts the way in which it feels the force.
+template <class Velocity> Vector velocity_of(const Face& f, int own, Vector x, Velocity velocity)
+{
+    const Vector foot = f.foot(x), v = velocity(f.wall, foot);
+    if (own == f.wall) return v;
+    const Vector other = velocity(own, foot);
+    return own_share(f, v) + (other - own_share(f, other));
+}
 
 class WallSurface {
 public:
@@ -28,7 +42,10 @@ private:
         int wall;
         Vector shift; // of this image, m
         scene::Box bounds;
+        bool moved; // it is not as drawn
     };
+    /// A point of space as the part's shape is drawn, m.
+    Vector as_drawn(const Part&, Vector x) const;
     bool covered(Vector x) const;
     /// True where the surface goes on beyond an edge towards a point that sees it along `way`: that is nearer, the edge no face.
     bool continued(Vector edge, Vector way) const;

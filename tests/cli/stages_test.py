@@ -1,7 +1,6 @@
 #!/usr/bin/python3
 """Events while a run goes on, forces on named walls, probes: the same bits on any ranks, threads and restarts between stages, a closed
 ledger, momentum to the last digits, and exit 2 for what contradicts itself. Run as stages_test.py PROGRAM [PART...]."""
-import csv
 import json
 import math
 import os
@@ -10,6 +9,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, finish, program, scratch
+from runs import Runs
 
 work = scratch("stages")
 
@@ -147,53 +147,8 @@ def block(end=0.5, cohesion=0.0, width=1.0, body="", wall="", gravity="[0.0, 0.0
     return BLOCK.format(**locals())
 
 
-def scene(name, text):
-    path = os.path.join(work, name + ".toml")
-    with open(path, "w") as f:
-        f.write(text)
-    return path
-
-
-def run(path, out, ranks=1, threads=1, extra=(), expect=0):
-    command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    command += [program, "run", path, "-o", os.path.join(work, out), "--threads", str(threads), *extra]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    check(done.returncode == expect, f"{out}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-400:]}")
-    return done
-
-
-def summary(out):
-    with open(os.path.join(work, out, "summary.json")) as f:
-        return json.load(f)
-
-
-def raw(out, name):
-    with open(os.path.join(work, out, name), "rb") as f:
-        return f.read()
-
-
-def table(out, name):
-    """Rows of a table as dicts, numbers where they are some."""
-    with open(os.path.join(work, out, name)) as f:
-        rows = [r for r in csv.DictReader(f) if not next(iter(r.values())).startswith("#")]
-
-    def value(x):
-        try:
-            return float(x)
-        except ValueError:
-            return x
-
-    return [{k: value(x) for k, x in r.items()} for r in rows]
-
-
-def unaccounted(out):
-    """Of each row of the history, the energy that came from nowhere since the start, J; and the largest energy of the run."""
-    rows = table(out, "history.csv")
-    accounts = "kinetic potential elastic plastic viscous wall damping stabilising events".split()
-    sums = [sum(r[k] for k in accounts) for r in rows]
-    return [s - sums[0] for s in sums], max(r["kinetic"] + r["elastic"] + max(-r["potential"], 0) for r in rows)
-
-
+runs = Runs(work)
+scene, run, summary, raw, table, unaccounted = runs.scene, runs.run, runs.summary, runs.raw, runs.table, runs.unaccounted
 TABLES = ("history.csv", "events.csv", "forces.csv", "probes.csv")
 
 
@@ -384,10 +339,7 @@ def refused():
         "probe of nothing": (DUG + "[[probe]]\nparticle = 100000\n", "an id from 0 to"),
         "overlap": ((EXCAVATION + STAGES).replace("low = [6.5, 0.0, 2.0]", "low = [6.5, 0.0, 1.5]"), "an overlap"),
     }
-    for name, (text, words) in wrong.items():
-        done = run(scene("wrong", text), "wrong", expect=2)
-        check(words in done.stderr, f"{name}: {words}" + ("" if words in done.stderr else f": {done.stderr.strip()[-300:]}"))
-        check(not os.path.exists(os.path.join(work, "wrong")), f"{name}: nothing is written")
+    runs.refused(wrong)
 
 
 def main():

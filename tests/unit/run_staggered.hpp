@@ -5,9 +5,31 @@
 // - as it is: sigma, rho, plastic strain, energies, viscous acceleration;
 // - with soil so strong that it stays elastic, without stress: sigma' = R l R^T + l, l = dt/2 C : D, solved for l by repeated insertion;
 // - so strong, with +-S0 of distinct principal stresses: half the difference is R S0 R^T, and its spin w follows as in run_pass.hpp.
+#include "solver/scene/events.hpp"
+#include "solver/scene/motion.hpp"
 #include "tests/unit/run_pass.hpp"
 
 namespace kuzure::measured {
+
+/// Walls of a scene whose events move them, in a step of `wall_dt` before one of `wall_next`, s; a little way on, where all go the same
+/// way.
+constexpr double wall_dt = 0.02, wall_next = 0.03;
+inline std::vector<WallPlace> places_of(const Scene& s)
+{
+    std::vector<WallPlace> places(s.walls.size());
+    const auto moving = scene::moving_walls(s);
+    const auto velocity = [&](int w) {
+        return std::ranges::find_if(s.events, [&](const auto& e) { return e.move->wall == s.walls[std::size_t(w)].name; })->move->velocity;
+    };
+    bool together = moving.size() == s.walls.size();
+    for (const int w : moving) together = together && velocity(w) == velocity(moving[0]);
+    for (const int w : moving) {
+        const Vector v = velocity(w), on = together ? 0.01 * v : Vector{};
+        auto& place = places[std::size_t(w)];
+        place.before.shift = on - wall_dt * v, place.after.shift = on, place.later.shift = on + (0.6 * wall_next) * v;
+    }
+    return places;
+}
 
 /// Energies of particles passed together, J.
 struct Worked {
@@ -37,6 +59,10 @@ public:
         cloud_.prepare(*model_, 0.1);
         state(cloud_.particles);
         model_->make_records(cloud_.particles, cloud_.soils, {});
+        if (scene::any_wall_moves(cloud_.scene)) {
+            const auto places = places_of(cloud_.scene);
+            model_->place_walls({places, wall_dt, wall_next, false});
+        }
         start_ = cloud_.particles;
     }
     Stages(const Stages&) = delete;

@@ -141,15 +141,22 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         if (coulomb) k.slip = p[field::wall_slip][i], k.pressed = p[field::wall_pressure][i], k.friction = p[field::wall_friction][i];
         kept.push_back(k);
     }
-    const auto ground = book::ground(s.walls, period_of(s), s.dimensions, s.space.spacing);
+    const auto places = places_of(s);
+    std::vector<scene::Wall> walls = s.walls;
+    for (std::size_t w = 0; w < walls.size(); ++w) walls[w].shape = book::shifted(walls[w].shape, places[w].after.shift);
+    const auto ground = book::ground(walls, period_of(s), s.dimensions, s.space.spacing);
     std::vector<book::GroundPoint> points;
     for (const auto& w : c.walls)
         for (std::size_t k = 0; k < w.x.size(); ++k) {
-            const Vector at{w.x[k], w.y[k], w.z[k]};
-            points.push_back({at, book::exposed_faces(ground, s.walls, at, s.support())});
+            const Vector at = Vector{w.x[k], w.y[k], w.z[k]} + places[std::size_t(w.wall)].after.shift;
+            points.push_back({at, book::exposed_faces(ground, s.walls, at, s.support()), w.wall});
             if (planted.of_wall) planted.of_wall(points.back());
         }
-    const book::Setting setting{s.interactions(), c.soils, s.walls, damping};
+    book::Setting setting{s.interactions(), c.soils, s.walls, damping};
+    for (const auto& p : places) {
+        setting.motion.push_back({(1 / wall_dt) * (p.after.shift - p.before.shift), {}});
+        setting.next_motion.push_back({(1 / wall_next) * (p.later.shift - p.after.shift), {}});
+    }
     const book::Soil ground_soil{x, v, density, stress, soil};
     const auto [dt, next] = steps(c);
     Read read;
@@ -175,13 +182,14 @@ double norm(const Stress& s) { return std::sqrt(contract(s, s)); }
 struct Difference {
     double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0;                       // strain
     double acceleration = 0, velocity = 0, rate = 0, slip = 0, pressure = 0, friction = 0; // force
-    double strain_energy[3] = {}, before[4] = {}, later[4] = {};                           // energies
+    double strain_energy[3] = {}, moved[4] = {}, before[5] = {}, later[5] = {};            // energies; moved: by viscosity at moving walls
     std::int64_t pairs = 0;
     double largest() const
     {
         double most = std::max({L, stress, density, plastic, viscous, acceleration, velocity, pressure, friction}); // but for rate and slip
         for (const auto e : strain_energy) most = std::max(most, e);
-        for (int k = 0; k < 4; ++k) most = std::max({most, before[k], later[k]});
+        for (const auto e : moved) most = std::max(most, e);
+        for (int k = 0; k < 5; ++k) most = std::max({most, before[k], later[k]});
         return most;
     }
 };
@@ -191,8 +199,10 @@ std::ostream& operator<<(std::ostream& to, const Difference& d)
        << " a " << d.acceleration << " v " << d.velocity << " stress rate " << d.rate << " slip " << d.slip << " pressure " << d.pressure
        << " friction " << d.friction << " pairs " << d.pairs << " energies of strain";
     for (const auto e : d.strain_energy) to << " " << e;
+    to << " of moving walls";
+    for (const auto e : d.moved) to << " " << e;
     to << " of force";
-    for (int k = 0; k < 4; ++k) to << " " << d.before[k] << " " << d.later[k];
+    for (int k = 0; k < 5; ++k) to << " " << d.before[k] << " " << d.later[k];
     return to;
 }
 struct Passed {
@@ -228,6 +238,7 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         a = std::max(a, length(read.forced[i].acceleration)), L = std::max(L, norm(read.strain[i].L));
         rate = std::max(rate, norm(read.forced[i].stress_rate));
     }
+    for (const auto& p : places_of(c.scene)) speed = std::max(speed, length(p.after.shift - p.before.shift) / wall_dt);
     const double of_a = std::max(a, stress / (density * h)), of_L = std::max(L, speed / h), of_stress = std::max(stress, dt * stiff * of_L);
     const double of_energy =
         volume * std::max(of_stress, density * of_a * h) * std::max({of_L * dt, of_stress / stiff, of_a * dt * dt / h});
@@ -258,20 +269,29 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         note(d.strain_energy[0], std::fabs(g.result.energy.plastic - plastic), g.count * of_energy);
         note(d.strain_energy[1], std::fabs(g.result.energy.stabilising - stabilising), g.count * of_energy);
         note(d.strain_energy[2], std::fabs(g.result.energy.wall - wall), g.count * of_energy);
+        double given = 0, coming = 0; // by moving walls through viscosity, a step of the same length after this one
+        for (Index i = g.first; i < g.first + g.count; ++i) {
+            const double mass = c.soils[std::size_t(p[field::soil][i])].density * volume;
+            given += 0.5 * dt * mass * read.strain[i].power, coming += 0.5 * dt * mass * read.strain[i].next_power;
+        }
+        note(d.moved[0], std::fabs(g.result.energy.viscous - given), g.count * of_energy);
+        note(d.moved[1], std::fabs(g.result.energy.moved_wall + given), g.count * of_energy);
+        note(d.moved[2], std::fabs(g.result.later.viscous - coming), g.count * of_energy);
+        note(d.moved[3], std::fabs(g.result.later.moved_wall + coming), g.count * of_energy);
     }
     for (const auto& g : pass.force.worked) {
-        double before[4] = {}, later[4] = {};
+        double before[5] = {}, later[5] = {};
         std::int64_t pairs = 0;
         for (Index i = g.first; i < g.first + g.count; ++i) {
             const auto add = [](double* to, const book::Taken& t) {
-                to[0] += t.viscous, to[1] += t.stabilising, to[2] += t.wall, to[3] += t.damping;
+                to[0] += t.viscous, to[1] += t.stabilising, to[2] += t.wall, to[3] += t.damping, to[4] += t.moved_wall;
             };
             add(before, read.forced[i].before), add(later, read.forced[i].coming);
             pairs += read.forced[i].pairs;
         }
         const auto compare = [&](double* worst, const EnergySums& e, const double* sums) {
-            const double is[4] = {e.viscous, e.stabilising, e.wall, e.damping};
-            for (int k = 0; k < 4; ++k) note(worst[k], std::fabs(is[k] - sums[k]), g.count * of_energy);
+            const double is[5] = {e.viscous, e.stabilising, e.wall, e.damping, e.moved_wall};
+            for (int k = 0; k < 5; ++k) note(worst[k], std::fabs(is[k] - sums[k]), g.count * of_energy);
         };
         compare(d.before, g.result.energy, before), compare(d.later, g.result.later, later);
         d.pairs = std::max(d.pairs, std::abs(g.result.pairs - pairs));
@@ -357,6 +377,43 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
     for (const auto contact : {Forced::Contact::Presses, Forced::Contact::Approached, Forced::Contact::LetGo})
         EXPECT_GT(contacts[int(contact)], 50) << int(contact);
     for (const auto rub : {Forced::Rubs::Not, Forced::Rubs::Sticks, Forced::Rubs::Slides}) EXPECT_GT(rubs[int(rub)], 50) << int(rub);
+}
+
+TEST(StaggeredByTheBook, WallsThatMove)
+{
+    const auto moved = [](Scene s, const std::vector<double>& factors) {
+        for (std::size_t w = 0; w < factors.size(); ++w) {
+            s.walls[w].name = "wall " + std::to_string(w);
+            const double f = factors[w];
+            const Vector v = f * Vector{0.3, s.dimensions == 3 ? -0.2 : 0, 0.25};
+            scene::Event e;
+            e.from = 1.0, e.to = 1.51;
+            e.move = scene::WallMove{s.walls[w].name, v, {}};
+            s.events.push_back(e);
+        }
+        return s;
+    };
+    int arrangement = 0;
+    for (const Scene& bare : scenes(staggered))
+        for (int surface = 0; surface < 3; ++surface) {
+            Scene s = bare;
+            const auto hold = [&](const Scene& of, const std::string& what) {
+                const auto arranged = Arrangement(1 + arrangement++ % 5);
+                const Cloud c = walled_cloud(arranged, of);
+                const Read read = by_the_book(c);
+                const auto given = [](const book::Forced& i) { return i.before.moved_wall != 0 && i.coming.moved_wall != 0; };
+                EXPECT_GT(std::ranges::count_if(read.forced, given), 5) << what;
+                expect_by_the_book(c, read, what + ", " + arrangements[arranged]);
+            };
+            s.walls = {wall(arrangement % 4 == 1 && s.dimensions == 2 ? 3 : arrangement % 4, surface, s.dimensions)};
+            hold(moved(s, {1}), std::string(surfaces[surface]) + " wall");
+            s.walls = seam(s.dimensions, surface, surface);
+            Scene one = moved(s, {1, 1});
+            hold(one, std::string(surfaces[surface]) + " seam");
+            s.walls = corner(s.dimensions);
+            s.walls[0].surface = scene::Surface(surface);
+            hold(moved(s, {0.5, -1}), std::string(surfaces[surface]) + " corner whose walls part");
+        }
 }
 
 TEST(StaggeredByTheBook, PoreWaterAndNoGravity)

@@ -6,7 +6,7 @@
 namespace kuzure {
 
 namespace {
-constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising"};
+constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising", "moved_wall"};
 static_assert(dissipated_names.size() == std::tuple_size_v<decltype(DissipatedUnits::members)>);
 } // namespace
 
@@ -37,6 +37,7 @@ std::string clock_text(const Simulation& sim)
                                   {"events", c.events},
                                   {"taken", c.taken},
                                   {"impulse", c.impulse},
+                                  {"sorted_time", c.sorted_time},
                                   {"frame_way", {c.frame_way.x, c.frame_way.y, c.frame_way.z}},
                                   {"largest_energy", c.largest_energy},
                                   {"largest_taken", {c.largest_taken.plastic, c.largest_taken.viscous, c.largest_taken.damping}},
@@ -62,6 +63,7 @@ Clock clock_from_text(const std::string& header, const io::Place& file)
         j.at("energy_at_start").get_to(c.energy_at_start), j.at("energy_unit").get_to(c.energy_unit);
         j.at("step_scale").get_to(c.step_scale), j.at("base_time").get_to(c.base_time);
         j.at("base_step").get_to(c.base_step), j.at("inspected").get_to(c.inspected);
+        j.at("sorted_time").get_to(c.sorted_time);
         j.at("events").get_to(c.events), j.at("taken").get_to(c.taken), j.at("impulse").get_to(c.impulse);
         const auto& way = j.at("frame_way");
         way.at(0).get_to(c.frame_way.x), way.at(1).get_to(c.frame_way.y), way.at(2).get_to(c.frame_way.z);

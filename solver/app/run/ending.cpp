@@ -10,6 +10,7 @@
 #include "solver/core/ensure.hpp"
 #include "solver/core/simd.hpp"
 #include "solver/core/wall_clock.hpp"
+#include "solver/scene/motion.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 
@@ -64,7 +65,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
                 {"wall", l.dissipated.wall},
                 {"damping", l.dissipated.damping},
                 {"stabilising", l.dissipated.stabilising},
-                {"moved_wall", 0.0},
+                {"moved_wall", l.dissipated.moved_wall},
                 {"events", l.events},
                 {"residual", sim.residual(l)}};
     s.effects = scene_.notes;
@@ -75,7 +76,8 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     const std::int64_t memory = comm_.max(std::int64_t(sim.memory_bytes()));
     auto j = io::to_json(s);
     j["memory_bytes_per_rank"] = memory;
-    if (sim.filling().wall_count() > 0) j["walls_in"] = {"snapshots/state_000000.hdf", "snapshots/walls.hdf"};
+    if (sim.filling().wall_count() > 0 && scene::walls_change(scene_)) j["walls_in"] = {"snapshots/state_*.hdf"};
+    else if (sim.filling().wall_count() > 0) j["walls_in"] = {"snapshots/state_000000.hdf", "snapshots/walls.hdf"};
     j["rebuilds"] = sim.rebuilds();
     j["repartitions"] = sim.balance().cuts();
     j["repartitions_by_metis"] = sim.balance().full_partitions();

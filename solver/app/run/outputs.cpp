@@ -2,6 +2,7 @@
 #include "io/soil_color.hpp"
 #include "solver/core/wall_clock.hpp"
 #include "solver/run/probes.hpp"
+#include "solver/scene/motion.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -20,6 +21,19 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const Mater
         w.position.push_back(f.wall_position(first + k));
         w.id.push_back(first + k);
         w.density.push_back(first_soil.density);
+    }
+    return w;
+}
+
+/// Of those what is there now, where events have moved it.
+io::WallPoints walls_of_now(const io::WallPoints& drawn, const scene::Filling& f, const Scene& now)
+{
+    io::WallPoints w;
+    for (std::size_t k = 0; k < drawn.size(); ++k) {
+        const scene::Wall& wall = now.walls[std::size_t(f.wall_of(drawn.id[k]))];
+        if (!wall.present) continue;
+        w.position.push_back(wall.pose == scene::Pose{} ? drawn.position[k] : scene::placed(wall.pose, drawn.position[k]));
+        w.id.push_back(drawn.id[k]), w.density.push_back(drawn.density[k]);
     }
     return w;
 }
@@ -162,7 +176,7 @@ void Outputs::write_history(Simulation& sim)
                       fronts.min_y,
                       fronts.max_y,
                       l.dissipated.stabilising,
-                      0.0,
+                      l.dissipated.moved_wall,
                       l.events});
 }
 
@@ -188,7 +202,8 @@ void Outputs::write_snapshot(const Simulation& sim, std::optional<std::int64_t> 
     if (scene_.output.picture && !label.fields.empty())
         if (const std::string behind = io::field_behind(scene_.output.picture->color); std::ranges::count(label.fields, behind) == 0)
             label.fields.push_back(behind);
-    snapshots_->write(sim.particles(), walls_, label);
+    label.walls_change = scene::walls_change(scene_);
+    snapshots_->write(sim.particles(), label.walls_change ? walls_of_now(walls_, sim.filling(), sim.scene()) : walls_, label);
 }
 
 void Outputs::write_failure(Simulation& sim)

@@ -4,6 +4,7 @@
 #include "solver/run/blocks.hpp"
 #include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/motion.hpp"
 #include "solver/scene/nearby.hpp"
 #include <algorithm>
 #include <cmath>
@@ -83,6 +84,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };
     e.snapshots = s.output.every ? times(*s.output.every) + 2 : 2;
     e.snapshot = double(io::snapshot_bytes(e.soil, s.output.fields));
+    if (scene::walls_change(s)) e.snapshot += double(io::snapshot_bytes(e.walls, s.output.fields));
     e.wall_files = e.walls > 0 ? 2 * double(io::snapshot_bytes(e.walls, s.output.fields)) : 0;
     e.checkpoint = double(io::checkpoint_bytes(e.soil, std::size_t(columns / std::max<double>(1, double(e.soil)))));
     e.history_rows = s.output.history ? times(*s.output.history) + 1 : 1;

@@ -1,0 +1,194 @@
+#include "solver/scene/motion.hpp"
+#include "solver/scene/events.hpp"
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace kuzure::scene {
+namespace {
+
+/// Seconds that a move has gone on at a time.
+double gone(const Event& e, double time) { return std::clamp(time - begin_of(e), 0.0, end_of(e) - begin_of(e)); }
+
+/// Turn by an angle about an axis through the origin. Rodrigues' formula.
+Pose turn_about(Vector axis, double angle)
+{
+    const Vector n = (1 / length(axis)) * axis;
+    const double c = std::cos(angle), s = std::sin(angle);
+    const auto row = [&](Vector e) { return c * e + ((1 - c) * dot(n, e)) * n - s * cross(n, e); };
+    // The rows of a turn are the axes turned back.
+    return {{row({1, 0, 0}), row({0, 1, 0}), row({0, 0, 1})}, {}};
+}
+/// What a move has done after so many seconds: turned about its center, then carried along with it.
+Pose done(const WallMove& m, double seconds)
+{
+    Pose p;
+    if (m.turn && seconds > 0) {
+        p = turn_about(m.turn->axis, seconds * m.turn->rate);
+        p.shift = m.turn->center - turned(p, m.turn->center);
+    }
+    p.shift = p.shift + seconds * m.velocity;
+    return p;
+}
+
+template <class Visit> void for_each_move(const Scene& s, int wall, int begun, Visit visit)
+{
+    const auto order = order_of_events(s);
+    for (int k = 0; k < begun; ++k) {
+        const Event& e = s.events[std::size_t(order[std::size_t(k)])];
+        if (e.move && e.move->wall == s.walls[std::size_t(wall)].name) visit(e, *e.move);
+    }
+}
+template <class Visit> void for_each_corner(const Shape& shape, Visit visit)
+{
+    const Box b = bounds(shape);
+    for (const double x : {b.low.x, b.high.x})
+        for (const double y : {b.low.y, b.high.y})
+            for (const double z : {b.low.z, b.high.z}) visit(Vector{x, y, z});
+}
+
+} // namespace
+
+bool moves(const Scene& s, int wall)
+{
+    const auto& name = s.walls[std::size_t(wall)].name;
+    return !name.empty() && std::ranges::any_of(s.events, [&](const Event& e) { return e.move && e.move->wall == name; });
+}
+bool any_wall_moves(const Scene& s)
+{
+    return std::ranges::any_of(s.events, [](const Event& e) { return e.move.has_value(); });
+}
+bool walls_change(const Scene& s)
+{
+    const auto names_a_wall = [&](const std::vector<std::string>& names) {
+        return std::ranges::any_of(s.walls, [&](const Wall& w) { return !w.name.empty() && std::ranges::count(names, w.name) > 0; });
+    };
+    return std::ranges::any_of(s.events, [&](const Event& e) { return e.move || names_a_wall(e.add) || names_a_wall(e.remove); });
+}
+std::vector<int> moving_walls(const Scene& s)
+{
+    std::vector<int> all;
+    for (int w = 0; w < int(s.walls.size()); ++w)
+        if (moves(s, w)) all.push_back(w);
+    return all;
+}
+
+Pose pose_at(const Scene& s, int wall, int begun, double time)
+{
+    Pose p;
+    for_each_move(s, wall, begun, [&](const Event& e, const WallMove& m) { p = then(p, done(m, gone(e, time))); });
+    return p;
+}
+
+RigidMotion motion_between(const Scene& s, int wall, int begun, double from, double to)
+{
+    RigidMotion all;
+    if (!(to > from)) return all;
+    for_each_move(s, wall, begun, [&](const Event& e, const WallMove& m) {
+        const double a = gone(e, from), b = gone(e, to), share = (b - a) / (to - from);
+        if (share == 0) return;
+        RigidMotion motion{share * m.velocity, {}};
+        if (m.turn) {
+            const Vector center = m.turn->center + (0.5 * (a + b)) * m.velocity;
+            motion.spin = (share * m.turn->rate / length(m.turn->axis)) * m.turn->axis;
+            motion.velocity = motion.velocity - cross(motion.spin, center);
+        }
+        all = all + motion;
+    });
+    return all;
+}
+
+double farthest_way(const Shape& shape, const Pose& a, const Pose& b)
+{
+    double most = 0;
+    for_each_corner(shape, [&](Vector x) { most = std::max(most, length(placed(b, x) - placed(a, x))); });
+    return most;
+}
+double largest_speed(const Shape& shape, const Pose& pose, const RigidMotion& motion)
+{
+    double most = 0;
+    for_each_corner(shape, [&](Vector x) { most = std::max(most, length(motion.at(placed(pose, x)))); });
+    return most;
+}
+
+double fastest_wall(const Scene& s)
+{
+    double most = 0;
+    const int all = int(s.events.size());
+    for (const int w : moving_walls(s))
+        for (const Event& e : s.events)
+            if (e.move && e.move->wall == s.walls[std::size_t(w)].name) {
+                const double begin = begin_of(e), soon = begin + 1e-3 * (end_of(e) - begin);
+                const auto motion = motion_between(s, w, all, begin, soon);
+                most = std::max(most, largest_speed(s.walls[std::size_t(w)].shape, pose_at(s, w, all, begin), motion));
+            }
+    return most;
+}
+
+Contact contact(const Wall& w, Vector x, int dimensions)
+{
+    if (w.pose == Pose{}) return contact(w.shape, x, dimensions);
+    const Contact c = contact(w.shape, as_drawn(w.pose, x), dimensions);
+    return {c.distance, turned(w.pose, c.normal)};
+}
+Box bounds(const Wall& w)
+{
+    if (w.pose == Pose{}) return bounds(w.shape);
+    const double all = std::numeric_limits<double>::max();
+    Box b{{all, all, all}, {-all, -all, -all}};
+    for_each_corner(w.shape, [&](Vector drawn) {
+        const Vector x = placed(w.pose, drawn);
+        b.low = {std::min(b.low.x, x.x), std::min(b.low.y, x.y), std::min(b.low.z, x.z)};
+        b.high = {std::max(b.high.x, x.x), std::max(b.high.y, x.y), std::max(b.high.z, x.z)};
+    });
+    return b;
+}
+
+void check_move(const Scene& s, const Event& e, const std::string& key, Issues& issues)
+{
+    if (!e.move) return;
+    const WallMove& m = *e.move;
+    const auto error = [&](const std::string& where, std::string text) {
+        issues.push_back({Severity::Error, key + ".move" + where, std::move(text), {}});
+    };
+    if (!e.from) error("", "expected from and to, since a motion begins and ends, found at; write from = and to = instead");
+    if (s.accuracy.scheme != Scheme::Staggered)
+        error("", "expected accuracy.scheme = \"staggered\" where walls move, found \"leap-frog\"; leave accuracy.scheme out");
+    if (m.velocity == Vector{} && !m.turn)
+        error("", "expected a velocity or a rotation, found neither; write, for example, velocity = [0.0, 0.0, 1.5]");
+    if (s.dimensions == 2 && m.velocity.y != 0)
+        error(".velocity", fmt::format("expected no motion along y in two dimensions, found {:g} m/s; write 0.0", m.velocity.y));
+    if (m.turn) {
+        const Vector n = m.turn->axis;
+        if (n == Vector{}) error(".rotation.axis", "expected a direction, found [0, 0, 0]; about y: [0.0, 1.0, 0.0]");
+        else if (s.dimensions == 2 && (n.x != 0 || n.z != 0))
+            error(".rotation.axis", "expected the axis y in two dimensions, found another; leave it out");
+    }
+    const int number = wall_named(s, m.wall);
+    if (number < 0) {
+        std::string names;
+        for (const auto& w : s.walls)
+            if (!w.name.empty()) names += (names.empty() ? "" : ", ") + w.name;
+        return error(".wall", fmt::format("expected the name of a wall, found \"{}\"; the names here: {}", m.wall,
+                                          names.empty() ? std::string("none; give that wall a name = \"...\"") : names));
+    }
+    if (std::holds_alternative<Ground>(s.walls[std::size_t(number)].shape))
+        error(".wall", "expected a wall of [[wall]], found real ground, which stays where it is");
+    const auto& periodic = s.space.periodic;
+    const double along[3] = {m.velocity.x, m.velocity.y, m.velocity.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!periodic[std::size_t(axis)]) continue;
+        const char* name = axis == 0 ? "x" : axis == 1 ? "y" : "z";
+        if (along[axis] != 0)
+            error(".velocity", fmt::format("expected no motion along {}, along which the space repeats, found {:g} m/s; leave one out",
+                                           name, along[axis]));
+        if (!m.turn) continue;
+        const double n[3] = {m.turn->axis.x, m.turn->axis.y, m.turn->axis.z};
+        if (std::fabs(n[axis]) < length(m.turn->axis))
+            error(".rotation",
+                  fmt::format("expected a turn about {}, along which the space repeats, found another axis; leave one out", name));
+    }
+}
+
+} // namespace kuzure::scene
