@@ -212,9 +212,6 @@ private:
     [[gnu::noinline]] std::int64_t sum_over_walls(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, Rows& out,
                                                   WallShare<W>& share) const
     {
-        const auto& p = std::as_const(*in.particles);
-        const auto x = p[field::position], v = p[field::velocity];
-        const auto sigma = p[field::stress];
         const Mirrored law;
         const auto [support, support2, softening, tiny] = Base::lengths();
         const V zero(T(0));
@@ -224,19 +221,7 @@ private:
             const MirroredWall<T>& wall = walls_[number];
             const auto list = runs.subspan(2, runs[1]);
             runs = runs.subspan(2 + runs[1]);
-            WallContact contact[W];
-            T normal[3][W], colliding[3][W], inverse_distance[W];
-            for (int k = 0; k < W; ++k) {
-                const Index at = i.first + std::min(k, i.count - 1);
-                contact[k] = wall_contact(*wall.wall, x[at], v[at], sigma[at], dimensions_);
-                const auto& c = contact[k];
-                normal[0][k] = T(c.normal.x), normal[1][k] = T(c.normal.y), normal[2][k] = T(c.normal.z);
-                colliding[0][k] = T(c.colliding.x), colliding[1][k] = T(c.colliding.y), colliding[2][k] = T(c.colliding.z);
-                // at or below the surface the factor is at its cap
-                inverse_distance[k] = T(c.distance > 1e-9 * unit_ ? unit_ / c.distance : 1e9);
-            }
-            const AtWall<V> here{{load<V>(normal[0]), load<V>(normal[1]), load<V>(normal[2])}, load<V>(inverse_distance)};
-            const Vec3<V> vc{load<V>(colliding[0]), load<V>(colliding[1]), load<V>(colliding[2])};
+            const Contacts at = contacts_with(*wall.wall, in, i);
             Vec3<V> G{zero, zero, zero}, B = G, P = G;
             for (const Index point : list) {
                 const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
@@ -248,11 +233,11 @@ private:
                 const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
                 const V w = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root);
                 const Vec3<V> g = w * r;
-                const V factor = law.factor(WallPoint<V>{r, number, point}, here);
+                const V factor = law.factor(WallPoint<V>{r, number, point}, at.wall);
                 G = G + g;
                 B = fma(factor, g, B);
                 if constexpr (M::viscous) {
-                    const V approach = max(-(factor * dot(vc, r)), zero);
+                    const V approach = max(-(factor * dot(at.colliding, r)), zero);
                     const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                     P = fma(pressure, g, P);
                 }
@@ -261,31 +246,59 @@ private:
             const V* rows[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
             for (int k = 0; k < 9; ++k) store_wide(sums[k], *rows[k]);
             for (int k = 0; k < i.count; ++k) {
-                const WallContact& c = contact[k];
-                const Index at = i.first + k;
-                const Vector g{volume_ * sums[0][k], volume_ * sums[1][k], volume_ * sums[2][k]};
-                Vector b{volume_ * sums[3][k], volume_ * sums[4][k], volume_ * sums[5][k]};
-                const Vector q{volume_ * sums[6][k], volume_ * sums[7][k], volume_ * sums[8][k]};
-                Vector force = 2.0 * (c.stress * g) - q, mirrored = c.mirrored;
-                if (wall.wall->surface == scene::Surface::Coulomb) {
-                    // scale, the kernel's constant, is negative: the force on the particle points along scale * force
-                    const Vector slip = mirrored - c.colliding;
-                    const double impedance = p[field::density][at] * now_[at].c_p * length(scale_ * g);
-                    const auto limited = limit_to_friction(scale_ * force, c.normal, wall.wall->friction_angle, slip, impedance);
-                    force = (1 / scale_) * limited.force;
-                    mirrored = c.colliding + limited.drag * slip;
-                    if (limited.pulls) b = {};
-                }
-                add_wall(out, k, force, mirrored, b);
-                if (g.x != 0 || g.y != 0 || g.z != 0) share.walled[k] = 1;
-                // taken by the wall per unit of rho_i V_i/m_i: -(v.f + sigma : L_wall); viscous: v.q
-                const Stress s = sigma[at];
-                const Vector sb = s * b;
-                const double stress_power = -(mirrored.x * sb.x + mirrored.y * sb.y + mirrored.z * sb.z);
-                share.power[k] -= scale_ * (dot(v[at], force) + stress_power);
+                const auto of = [&](int first) {
+                    return Vector{volume_ * sums[first][k], volume_ * sums[first + 1][k], volume_ * sums[first + 2][k]};
+                };
+                feel_wall(*wall.wall, in, i.first + k, at.contact[k], of(0), of(3), of(6), k, out, share);
             }
         }
         return pairs;
+    }
+    /// How the lanes of a cluster touch one wall.
+    struct Contacts {
+        WallContact contact[W];
+        AtWall<V> wall;
+        Vec3<V> colliding;
+    };
+    KUZURE_INLINE Contacts contacts_with(const scene::Wall& wall, const StepInput& in, const Cluster<V>& i) const
+    {
+        const auto& p = std::as_const(*in.particles);
+        Contacts of;
+        T normal[3][W], colliding[3][W], inverse_distance[W];
+        for (int k = 0; k < W; ++k) {
+            const Index at = i.first + std::min(k, i.count - 1);
+            const auto& c = of.contact[k] =
+                wall_contact(wall, p[field::position][at], p[field::velocity][at], p[field::stress][at], dimensions_);
+            normal[0][k] = T(c.normal.x), normal[1][k] = T(c.normal.y), normal[2][k] = T(c.normal.z);
+            colliding[0][k] = T(c.colliding.x), colliding[1][k] = T(c.colliding.y), colliding[2][k] = T(c.colliding.z);
+            // at or below the surface the factor is at its cap
+            inverse_distance[k] = T(c.distance > 1e-9 * unit_ ? unit_ / c.distance : 1e9);
+        }
+        of.wall = {{load<V>(normal[0]), load<V>(normal[1]), load<V>(normal[2])}, load<V>(inverse_distance)};
+        of.colliding = {load<V>(colliding[0]), load<V>(colliding[1]), load<V>(colliding[2])};
+        return of;
+    }
+    /// What one wall does to the particle `at`, lane k: from its sums of grad W, of factors times grad W, of viscous pressures.
+    void feel_wall(const scene::Wall& wall, const StepInput& in, Index at, const WallContact& c, Vector g, Vector b, Vector q, int k,
+                   Rows& out, WallShare<W>& share) const
+    {
+        const auto& p = std::as_const(*in.particles);
+        Vector force = 2.0 * (c.stress * g) - q, mirrored = c.mirrored;
+        if (wall.surface == scene::Surface::Coulomb) {
+            // scale, the kernel's constant, is negative: the force on the particle points along scale * force
+            const Vector slip = mirrored - c.colliding;
+            const double impedance = p[field::density][at] * now_[at].c_p * length(scale_ * g);
+            const auto limited = limit_to_friction(scale_ * force, c.normal, wall.friction_angle, slip, impedance);
+            force = (1 / scale_) * limited.force;
+            mirrored = c.colliding + limited.drag * slip;
+            if (limited.pulls) b = {};
+        }
+        add_wall(out, k, force, mirrored, b);
+        if (g.x != 0 || g.y != 0 || g.z != 0) share.walled[k] = 1;
+        // taken by the wall per unit of rho_i V_i/m_i: -(v.f + sigma : L_wall); viscous: v.q
+        const Vector sb = p[field::stress][at] * b;
+        const double stress_power = -(mirrored.x * sb.x + mirrored.y * sb.y + mirrored.z * sb.z);
+        share.power[k] -= scale_ * (dot(p[field::velocity][at], force) + stress_power);
     }
     /// The force of one wall and its share of the velocity gradient, -v (x) b, to lane k.
     static void add_wall(Rows& out, int k, Vector force, Vector v, Vector b)

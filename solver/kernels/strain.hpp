@@ -189,6 +189,27 @@ private:
         Vec3<U> viscous; // acceleration, m/s^2
     };
 
+    /// Writes a step's state where it has a length and the particle is awake; `next` is what counts then.
+    static KUZURE_INLINE void keep_strained(const StepInput& in, const Lanes& lanes, const Strained& was, U was_opened, Strained& next,
+                                            U opened)
+    {
+        auto& p = *in.particles;
+        if (in.sleep == SleepStage::Frozen) {
+            const auto mine = written<U>(lanes);
+            next.sigma = select(mine, next.sigma, was.sigma), next.rho = select(mine, next.rho, was.rho);
+            next.plastic_strain = select(mine, next.plastic_strain, was.plastic_strain);
+            opened = select(mine, opened, was_opened);
+            next.viscous = select(mine, next.viscous, std::as_const(p)[field::acceleration].template load<U>(lanes.at));
+        }
+        if (in.dt > 0) { // at the start of a run only the viscous force is wanted
+            p[field::stress].store(lanes.at, next.sigma, lanes.n);
+            p[field::density].store(lanes.at, next.rho, lanes.n);
+            p[field::plastic_strain].store(lanes.at, next.plastic_strain, lanes.n);
+            if (in.remembering) p[field::opened_volume].store(lanes.at, opened, lanes.n);
+        } else next.sigma = was.sigma, next.rho = was.rho;
+        p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
+    }
+
     KUZURE_INLINE void update_strain(const StepInput& in, const StrainSums<Lane>& rows, const StrainWalls<Lane>& wall_rows, bool walled,
                                      const Lanes& lanes, Tally<U>& tally)
     {
@@ -243,25 +264,12 @@ private:
         const Sym3<U> strain = dt * D;
         const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
         const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
-        auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
+        const auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
 
-        const auto mine = written<U>(lanes);
-        if (in.sleep == SleepStage::Frozen) {
-            next.sigma = select(mine, next.sigma, sigma), next.rho = select(mine, next.rho, rho);
-            next.plastic_strain = select(mine, next.plastic_strain, plastic);
-            mapped.opened = select(mine, mapped.opened, opened);
-            next.viscous = select(mine, next.viscous, was[field::acceleration].template load<U>(lanes.at));
-        }
-        if (in.dt > 0) { // at the start of a run only the viscous force is wanted
-            p[field::stress].store(lanes.at, next.sigma, lanes.n);
-            p[field::density].store(lanes.at, next.rho, lanes.n);
-            p[field::plastic_strain].store(lanes.at, next.plastic_strain, lanes.n);
-            if (in.remembering) p[field::opened_volume].store(lanes.at, mapped.opened, lanes.n);
-        } else next.sigma = sigma, next.rho = rho;
-        p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
+        keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);

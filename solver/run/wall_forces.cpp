@@ -30,91 +30,90 @@ WallForces::WallForces(const Scene& scene, std::span<const Material> soils, cons
     for (std::size_t k = 0; k < walls_.size(); ++k) number_of_[std::size_t(walls_[k])] = int(k);
 }
 
+/// What a particle sees of one wall.
+struct WallForces::Seen {
+    int wall;
+    double area = 0;   // of its kernel gradients
+    Vector traction{}; // of the particle's stress on its faces
+    Stress bears{};    // of the directions in which its faces bear
+};
+
+Face WallForces::face_of_now(const Face& face, Vector then, Vector now) const
+{
+    const auto& moved = since_[std::size_t(face.wall)];
+    Face f = face;
+    const Vector foot = face.foot(then);
+    if (moved) f.normal = scene::turned(*moved, f.normal), f.side = scene::turned(*moved, f.side);
+    f.depth = dot((moved ? scene::placed(*moved, foot) : foot) - now, f.normal);
+    return f;
+}
+
+void WallForces::see(Index wall, Index point, Vector x, const Stress& sigma, std::vector<Seen>& seen) const
+{
+    const WallPoints& w = layout_.walls()[std::size_t(wall)];
+    const auto& own = since_[std::size_t(wall)];
+    const Vector then{w.x[point], w.y[point], w.z[point]}, now = own ? scene::placed(*own, then) : then, r = x - now;
+    const double t = 1 - length(r) / scene_.support();
+    const auto& faces = faces_[std::size_t(wall)][std::size_t(point)];
+    if (!(t > 0) || faces.empty()) return;
+    const auto of_now = [&](const Face& f) { return own || since_[std::size_t(f.wall)] ? face_of_now(f, then, now) : f; };
+    // the first face in front of which the particle lies, as in the pair loop
+    const auto in_front = std::ranges::find_if(faces, [&](const Face& f) {
+        const Face here = of_now(f);
+        return here.depth < dot(r, here.normal);
+    });
+    const Face face = of_now(in_front == faces.end() ? faces.back() : *in_front);
+    const scene::Wall& of = scene_.walls[std::size_t(face.wall)];
+    const bool rough = of.surface == scene::Surface::Rough;
+    const bool grips = rough || (of.surface == scene::Surface::Coulomb && of.friction_angle > 0); // it bears along its face too
+    const Vector gradient = (t * t * t) * r, push = sigma * gradient, n = face.side;
+    const Vector traction = rough ? push : dot(push, face.normal) * face.normal, its = own_share(face, traction);
+    const auto feels = [&](int number, Vector force, const Stress& bears) {
+        auto here = std::ranges::find(seen, number, &Seen::wall);
+        if (here == seen.end()) here = seen.insert(here, {number});
+        here->area += length(gradient), here->traction = here->traction + force;
+        here->bears = here->bears + length(gradient) * bears;
+    };
+    const Stress every_way{1, 1, 1, 0, 0, 0}, along{n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.x * n.z};
+    // A point may stand behind a face of another wall, which is the one that feels it; at an edge both do.
+    const bool edge = face.wall != int(wall) && its != traction;
+    feels(face.wall, edge ? its : traction, grips ? every_way : along);
+    if (edge) feels(int(wall), traction - its, grips ? every_way : every_way - along);
+}
+
+template <class Visit> void WallForces::share(std::span<const Seen> seen, Vector x, Vector force, Visit visit) const
+{
+    const auto give = [&](const Seen& s, Vector f) {
+        if (const int k = number_of_[std::size_t(s.wall)]; k >= 0) visit(std::size_t(k), x, f);
+    };
+    if (seen.size() == 1) return give(seen[0], force);
+    Vector together{};
+    Stress all_bear{};
+    double sight = 0;
+    for (const auto& s : seen) together = together + s.traction, all_bear = all_bear + s.bears, sight += s.area;
+    const double square = dot(together, together), scale = square > 0 ? dot(force, together) / square : 0;
+    const Vector rest = force - scale * together, loads = solved(plus_isotropic(all_bear, 1e-9 * sight), rest);
+    const Vector left = rest - all_bear * loads; // what none of them can bear
+    for (const auto& s : seen) give(s, scale * s.traction + s.bears * loads + (s.area / sight) * left);
+}
+
 template <class Visit> void WallForces::for_each_force(const Particles& p, Index cluster, Visit visit) const
 {
     const ClusterLists& lists = layout_.lists();
     const auto all = lists.walls(cluster);
     if (all.empty()) return;
-    struct Seen {
-        int wall;
-        double area = 0;   // of its kernel gradients
-        Vector traction{}; // of the particle's stress on its faces
-        Stress bears{};    // of the directions in which its faces bear
-    };
+    const bool alone = std::size_t(all[1]) + 2 == all.size() && own_faces_[std::size_t(all[0])];
     std::vector<Seen> seen;
-    const double support = scene_.support(), volume = scene_.particle_volume();
-    const auto grips = [&](int wall) { // it bears along its face too
-        const scene::Wall& w = scene_.walls[std::size_t(wall)];
-        return w.surface == scene::Surface::Rough || (w.surface == scene::Surface::Coulomb && w.friction_angle > 0);
-    };
     for (Index i = lists.first(cluster); i < lists.first(cluster) + lists.count(cluster); ++i) {
         const Vector a = p[field::wall_force][i];
         if (a == Vector{}) continue;
         const Vector x = p[field::position][i];
-        const Vector force = (-soils_[std::size_t(p[field::soil][i])].density * volume) * a;
-        const bool alone = std::size_t(all[1]) + 2 == all.size() && own_faces_[std::size_t(all[0])];
-        if (alone) {
-            if (const int k = number_of_[std::size_t(all[0])]; k >= 0) visit(std::size_t(k), x, force);
-            continue;
-        }
         seen.clear();
-        const Stress sigma = p[field::stress][i];
-        for (auto runs = all; !runs.empty(); runs = runs.subspan(2 + std::size_t(runs[1]))) {
-            const WallPoints& w = layout_.walls()[std::size_t(runs[0])];
-            const auto& own = since_[std::size_t(runs[0])];
-            for (const Index point : runs.subspan(2, std::size_t(runs[1]))) {
-                const Vector then{w.x[point], w.y[point], w.z[point]}, now = own ? scene::placed(*own, then) : then, r = x - now;
-                const double t = 1 - length(r) / support;
-                const auto& faces = faces_[std::size_t(runs[0])][std::size_t(point)];
-                if (!(t > 0) || faces.empty()) continue;
-                const auto of_now = [&](Face f) {
-                    const auto& moved = since_[std::size_t(f.wall)];
-                    if (!own && !moved) return f;
-                    const Vector foot = then + f.depth * f.normal;
-                    if (moved) f.normal = scene::turned(*moved, f.normal), f.side = scene::turned(*moved, f.side);
-                    f.depth = dot((moved ? scene::placed(*moved, foot) : foot) - now, f.normal);
-                    return f;
-                };
-                // the first face in front of which the particle lies, as in the pair loop
-                const auto in_front = std::ranges::find_if(faces, [&](const Face& f) {
-                    const Face here = of_now(f);
-                    return here.depth < dot(r, here.normal);
-                });
-                const Face face = of_now(in_front == faces.end() ? faces.back() : *in_front);
-                const Vector gradient = (t * t * t) * r, push = sigma * gradient;
-                const bool rough = scene_.walls[std::size_t(face.wall)].surface == scene::Surface::Rough;
-                const Vector n = face.normal, all_of_it = rough ? push : dot(push, n) * n, its = own_share(face, all_of_it);
-                const Vector bearing = face.side;
-                const auto feels = [&](int wall, Vector force, Stress bears) {
-                    auto here = std::ranges::find(seen, wall, &Seen::wall);
-                    if (here == seen.end()) here = seen.insert(here, {wall});
-                    here->area += length(gradient), here->traction = here->traction + force;
-                    here->bears = here->bears + length(gradient) * bears;
-                };
-                const Stress all_ways{1, 1, 1, 0, 0, 0}, along{bearing.x * bearing.x, bearing.y * bearing.y, bearing.z * bearing.z,
-                                                               bearing.x * bearing.y, bearing.y * bearing.z, bearing.x * bearing.z};
-                const bool grip = grips(face.wall), edge = face.wall != runs[0] && its != all_of_it;
-                // A point may stand behind a face of another wall, which is the one that feels it; at an edge both do.
-                feels(face.wall, edge ? its : all_of_it, grip ? all_ways : along);
-                if (edge) feels(runs[0], all_of_it - its, grip ? all_ways : all_ways - along);
-            }
-        }
-        if (seen.size() == 1) {
-            if (const int k = number_of_[std::size_t(seen[0].wall)]; k >= 0) visit(std::size_t(k), x, force);
-            continue;
-        }
-        Vector together{};
-        double sight = 0;
-        for (const auto& s : seen) together = together + s.traction, sight += s.area;
-        const double square = dot(together, together), scale = square > 0 ? dot(force, together) / square : 0;
-        const Vector rest = force - scale * together;
-        Stress all_bear{};
-        for (const auto& s : seen) all_bear = all_bear + s.bears;
-        const Vector loads = solved(plus_isotropic(all_bear, 1e-9 * sight), rest);
-        const Vector left = rest - all_bear * loads; // what none of them can bear
-        for (const auto& s : seen)
-            if (const int k = number_of_[std::size_t(s.wall)]; k >= 0)
-                visit(std::size_t(k), x, scale * s.traction + s.bears * loads + (s.area / sight) * left);
+        if (alone) seen.push_back({int(all[0])});
+        else
+            for (auto runs = all; !runs.empty(); runs = runs.subspan(2 + std::size_t(runs[1])))
+                for (const Index point : runs.subspan(2, std::size_t(runs[1]))) see(runs[0], point, x, p[field::stress][i], seen);
+        share(seen, x, (-soils_[std::size_t(p[field::soil][i])].density * scene_.particle_volume()) * a, visit);
     }
 }
 

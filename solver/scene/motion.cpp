@@ -145,6 +145,27 @@ Box bounds(const Wall& w)
     return b;
 }
 
+namespace {
+/// Walls move neither along a period nor out of it.
+template <class Error> void check_periods(const Scene& s, const WallMove& m, Error error)
+{
+    const auto& periodic = s.space.periodic;
+    const double along[3] = {m.velocity.x, m.velocity.y, m.velocity.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!periodic[std::size_t(axis)]) continue;
+        const char* name = axis == 0 ? "x" : axis == 1 ? "y" : "z";
+        if (along[axis] != 0)
+            error(".velocity", fmt::format("expected no motion along {}, along which the space repeats, found {:g} m/s; leave one out",
+                                           name, along[axis]));
+        if (!m.turn) continue;
+        const double n[3] = {m.turn->axis.x, m.turn->axis.y, m.turn->axis.z};
+        if (std::fabs(n[axis]) < length(m.turn->axis))
+            error(".rotation",
+                  fmt::format("expected a turn about {}, along which the space repeats, found another axis; leave one out", name));
+    }
+}
+} // namespace
+
 void check_move(const Scene& s, const Event& e, const std::string& key, Issues& issues)
 {
     if (!e.move) return;
@@ -175,20 +196,7 @@ void check_move(const Scene& s, const Event& e, const std::string& key, Issues& 
     }
     if (std::holds_alternative<Ground>(s.walls[std::size_t(number)].shape))
         error(".wall", "expected a wall of [[wall]], found real ground, which stays where it is");
-    const auto& periodic = s.space.periodic;
-    const double along[3] = {m.velocity.x, m.velocity.y, m.velocity.z};
-    for (int axis = 0; axis < 3; ++axis) {
-        if (!periodic[std::size_t(axis)]) continue;
-        const char* name = axis == 0 ? "x" : axis == 1 ? "y" : "z";
-        if (along[axis] != 0)
-            error(".velocity", fmt::format("expected no motion along {}, along which the space repeats, found {:g} m/s; leave one out",
-                                           name, along[axis]));
-        if (!m.turn) continue;
-        const double n[3] = {m.turn->axis.x, m.turn->axis.y, m.turn->axis.z};
-        if (std::fabs(n[axis]) < length(m.turn->axis))
-            error(".rotation",
-                  fmt::format("expected a turn about {}, along which the space repeats, found another axis; leave one out", name));
-    }
+    check_periods(s, m, error);
 }
 
 } // namespace kuzure::scene
