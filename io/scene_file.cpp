@@ -4,6 +4,7 @@
 #include "io/ground_motion.hpp"
 #include "io/scene_description.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/scene/effects_list.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 #include <initializer_list>

@@ -1,7 +1,7 @@
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
-#include "solver/scene/check.hpp"
 #include "solver/scene/motion.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <limits>
 #include <omp.h>
 

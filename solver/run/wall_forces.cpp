@@ -1,6 +1,6 @@
 #include "solver/run/wall_forces.hpp"
 #include "solver/run/exact_sums.hpp"
-#include "solver/scene/check.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <algorithm>
 
 namespace kuzure {

@@ -1,10 +1,10 @@
 #include "solver/run/watch.hpp"
 #include "solver/run/start.hpp"
-#include "solver/scene/check.hpp"
 #include "solver/scene/events.hpp"
 #include "solver/scene/height_field.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>

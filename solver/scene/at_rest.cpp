@@ -1,6 +1,6 @@
 #include "solver/scene/at_rest.hpp"
-#include "solver/scene/check.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 

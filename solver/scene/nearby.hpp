@@ -1,5 +1,6 @@
 #pragma once
 // Which of many shapes may lie at a place: their boxes in a grid, so that thousands of bodies are not all asked everywhere.
+#include "solver/scene/box.hpp"
 #include "solver/scene/shape.hpp"
 #include <array>
 #include <cmath>
@@ -59,7 +60,6 @@ public:
 private:
     static constexpr double infinite = std::numeric_limits<double>::infinity();
     using Cell = std::array<std::int64_t, 3>;
-    static double at(const Vector& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
     std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const { return std::size_t((z * n_[1] + y) * n_[0] + x); }
     /// The cell of a place, the outermost ones for what lies outside; it never falls where a coordinate rises.
     Cell cell(const Vector& x) const

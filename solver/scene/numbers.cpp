@@ -1,5 +1,6 @@
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/material.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <cmath>
 #include <fmt/format.h>
 

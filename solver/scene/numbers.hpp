@@ -1,6 +1,6 @@
 #pragma once
 // The dimensionless numbers of a scene, known before it runs, and what they warn of.
-#include "solver/scene/check.hpp"
+#include "solver/scene/fill.hpp"
 #include <vector>
 
 namespace kuzure::scene {

@@ -1,7 +1,10 @@
 // Rules beyond single keys, the choice of effects, and the numbers derived from a soil.
 #include "solver/scene/check.hpp"
+#include "solver/scene/column_bytes.hpp"
+#include "solver/scene/effects_list.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/shape.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

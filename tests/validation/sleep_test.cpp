@@ -1,5 +1,5 @@
 // Soil that sleeps (accuracy.sleep_below): what it saves, what it changes, and that it wakes.
-#include "solver/scene/check.hpp"
+#include "solver/scene/step_limits.hpp"
 #include "tests/validation/case.hpp"
 #include <map>
 

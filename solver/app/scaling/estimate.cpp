@@ -2,7 +2,7 @@
 #include "io/checkpoint.hpp"
 #include "io/snapshot.hpp"
 #include "solver/run/blocks.hpp"
-#include "solver/scene/check.hpp"
+#include "solver/scene/column_bytes.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/nearby.hpp"

@@ -1,7 +1,7 @@
 #include "solver/app/scaling/forecast.hpp"
 #include "solver/core/mix.hpp"
 #include "solver/run/simulation.hpp"
-#include "solver/scene/check.hpp"
+#include "solver/scene/step_limits.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>

@@ -2,6 +2,7 @@
 #include "solver/app/study/convergence.hpp"
 #include "solver/app/study/profile.hpp"
 #include "solver/scene/check.hpp"
+#include "solver/scene/effects_list.hpp"
 #include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <cmath>
