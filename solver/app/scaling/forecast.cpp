@@ -49,7 +49,8 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     s.walls.clear(), s.events.clear(), s.probes.clear();
     s.bodies.resize(1);
     s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
-    s.time = {1.0, 1e-3 * scene::crossing_time(s)};
+    const double step = 1e-3 * scene::crossing_time(s);
+    s.time = {.end = 1e3 * step, .step = step}; // more steps than are taken below, however soft the soil
     RunOptions options;
     options.initial = [&](Particles& p) {
         for (Index i = 0; i < p.size(); ++i) {
