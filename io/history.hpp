@@ -1,12 +1,13 @@
 #pragma once
-// history.csv: what the soil did, a row an interval; progress.csv: how fast the run went.
+// The tables that a run writes as it goes, a kind of row each: history.csv, events.csv, forces.csv, probes.csv, progress.csv.
 #include "io/rows.hpp"
 #include "solver/core/tensor.hpp"
-#include <vector>
+#include <span>
+#include <string>
 
 namespace kuzure::io {
 
-/// One row, in the order of the file. Energies in J (2-D: J per m of thickness).
+/// history.csv, in its order. Energies in J (2-D: J per m of thickness).
 struct HistoryRow {
     double time;                                                         // s
     std::int64_t step;                                                   // 1
@@ -19,14 +20,6 @@ struct HistoryRow {
     double events;                  // J, that events have taken
 };
 
-class History : public Rows {
-public:
-    /// Collective. As Rows.
-    History(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
-    /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
-    void append(const HistoryRow&);
-};
-
 /// events.csv: what happened, a row an event.
 struct EventRow {
     double time;       // s
@@ -35,26 +28,12 @@ struct EventRow {
     std::string what;
     double taken; // J, by all events of this time
 };
-class EventLog : public Rows {
-public:
-    /// Collective. As Rows.
-    EventLog(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
-    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
-    void append(const std::vector<EventRow>&);
-};
 
 /// forces.csv: what soil does to a named wall, a row a wall at each time; in 2-D per metre of thickness.
 struct ForceRow {
     double time; // s
     std::string wall;
     Vector force, moment, impulse; // N, N m about the scene's origin, N s since the start
-};
-class ForceLog : public Rows {
-public:
-    /// Collective. As Rows.
-    ForceLog(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
-    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
-    void append(const std::vector<ForceRow>&);
 };
 
 /// probes.csv: a row a probe at each time.
@@ -67,15 +46,8 @@ struct ProbeRow {
     Stress stress;             // Pa
     double plastic_strain;     // 1
 };
-class ProbeLog : public Rows {
-public:
-    /// Collective. As Rows.
-    ProbeLog(const Team&, const Place& file, std::optional<double> restart_time = {});
-    /// Collective; rank 0's rows, of one time, count. Throws IoFailed on all ranks.
-    void append(const std::vector<ProbeRow>&);
-};
 
-/// How fast a run goes. It differs from run to run: nothing of it is in history.csv, whose bits do not.
+/// progress.csv: how fast a run goes. It differs from run to run: nothing of it is in history.csv, whose bits do not.
 struct ProgressRow {
     double time;             // s
     std::int64_t step;       // 1
@@ -85,13 +57,19 @@ struct ProgressRow {
     double balance;          // 1, busiest rank over the mean
 };
 
-/// progress.csv
-class ProgressLog : public Rows {
+/// The table of one kind of row.
+template <class Row> class Log : public Rows {
 public:
     /// Collective. As Rows.
-    ProgressLog(const Team&, const Place& file, std::optional<double> restart_time = {});
-    /// Collective; rank 0's row counts. Throws IoFailed on all ranks.
-    void append(const ProgressRow&);
+    Log(const Team&, const Place& file, int dimensions, std::optional<double> restart_time = {});
+    /// Collective; rank 0's row counts, or its rows of one time. Throws IoFailed on all ranks.
+    void append(const Row&);
+    void append(std::span<const Row>);
 };
+using History = Log<HistoryRow>;
+using EventLog = Log<EventRow>;
+using ForceLog = Log<ForceRow>;
+using ProbeLog = Log<ProbeRow>;
+using ProgressLog = Log<ProgressRow>;
 
 } // namespace kuzure::io

@@ -59,10 +59,10 @@ void Outputs::open(std::optional<double> restart)
 {
     snapshots_.emplace(comm_, directory_.snapshots(), restart);
     history_.emplace(comm_, directory_.history(), scene_.dimensions, restart);
-    progress_.emplace(comm_, directory_.progress(), restart);
+    progress_.emplace(comm_, directory_.progress(), scene_.dimensions, restart);
     if (!scene_.events.empty()) events_.emplace(comm_, directory_ / "events.csv", scene_.dimensions, restart);
     if (!WallForces::named(scene_).empty()) forces_.emplace(comm_, directory_ / "forces.csv", scene_.dimensions, restart);
-    if (!scene_.probes.empty()) probes_.emplace(comm_, directory_ / "probes.csv", restart);
+    if (!scene_.probes.empty()) probes_.emplace(comm_, directory_ / "probes.csv", scene_.dimensions, restart);
 }
 
 void Outputs::sync()
