@@ -20,11 +20,13 @@ bool has_terrain()
 #endif
 }
 
+const char* const built_without_maps = "this kuzure was built without maps. Remedy: run jobs/install.sh (Debian: libtiff-dev "
+                                       "libgeotiff-dev libproj-dev libshp-dev libpugixml-dev libarchive-dev) and build again with "
+                                       "-D KUZURE_TERRAIN=ON";
+
 void need_terrain(const std::string& who)
 {
-    if (!has_terrain())
-        throw BadInput(who + ": this kuzure was built without maps. Remedy: run jobs/install.sh (Debian: libtiff-dev libgeotiff-dev "
-                             "libproj-dev libshp-dev libpugixml-dev libarchive-dev) and build again with -D KUZURE_TERRAIN=ON");
+    if (!has_terrain()) throw BadInput(who + ": " + built_without_maps);
 }
 
 std::string utm_zone(double longitude, double latitude)

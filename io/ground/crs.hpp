@@ -12,6 +12,8 @@ namespace kuzure::io {
 bool has_terrain();
 /// Throws BadInput with the packages to install where has_terrain() is false.
 void need_terrain(const std::string& who);
+/// What it says.
+extern const char* const built_without_maps;
 
 /// The WKT of "EPSG:6670", of WKT of any kind or of a PROJ string. A system that EPSG knows becomes EPSG's own, heights are left out.
 /// Throws BadInput, beginning with `who` (a file, a key).

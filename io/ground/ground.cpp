@@ -50,7 +50,7 @@ private:
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
     void check_keys()
     {
-        need_terrain("terrain");
+        if (!has_terrain()) throw Refused{"terrain", built_without_maps};
         if (scene_.dimensions != 3) throw Refused{"terrain", "expected dimensions = 3 on real ground, found 2. Remedy: dimensions = 3"};
         if (terrain_.surface == scene::Surface::Coulomb && terrain_.friction_angle == 0)
             throw Refused{"terrain.friction",
@@ -89,73 +89,84 @@ private:
     void read_outline(scene::Release& r, const std::string& key)
     {
         Mass m{&r, key, {}, {}, {}, {}, {}};
-        const double far = std::numeric_limits<double>::infinity();
-        m.box = {far, far, -far, -far};
-        const auto widen = [&](double x, double y) {
-            m.box = {std::min(m.box.low_x, x), std::min(m.box.low_y, y), std::max(m.box.high_x, x), std::max(m.box.high_y, y)};
-        };
-        if (!r.outline.empty())
-            at_key(key + ".outline", [&] {
-                auto read = read_outlines(r.outline);
-                const auto own = crs_for(read.crs, crs_, r.outline);
-                std::optional<Transform> way;
-                if (!same_crs(own, crs_)) way.emplace(own, crs_, r.outline);
-                for (auto& outline : read.features)
-                    for (auto& ring : outline.rings)
-                        for (auto& p : ring) {
-                            if (way) p = (*way)(p[0], p[1]);
-                            if (!std::isfinite(p[0]))
-                                throw BadInput(fmt::format("{}: a corner cannot be brought into {}. Remedy: check the outline's system",
-                                                           r.outline, crs_name(crs_)));
-                            widen(p[0], p[1]);
-                        }
-                const bool by_feature = !r.thickness && r.thickness_map.empty() && r.surface.empty() && r.before.empty();
-                for (std::size_t k = 0; k < read.features.size(); ++k) {
-                    if (by_feature && !read.features[k].thickness)
-                        throw BadInput(fmt::format("{}: feature {}: it has no attribute \"thickness\", and the scene no thickness. Remedy: "
-                                                   "thickness = 4.5 beside outline, or "
-                                                   "the attribute for every feature",
-                                                   r.outline, k + 1));
-                    if (by_feature && !(*read.features[k].thickness > 0))
-                        throw BadInput(fmt::format("{}: feature {}: expected a thickness above 0, found {}", r.outline, k + 1,
-                                                   *read.features[k].thickness));
-                    m.rings.insert(m.rings.end(), read.features[k].rings.begin(), read.features[k].rings.end());
-                }
-                m.outlines = std::move(read.features);
-                if (!m.box.meets(all_)) {
-                    const Window turned{m.box.low_y, m.box.low_x, m.box.high_y, m.box.high_x};
-                    throw BadInput(fmt::format(
-                        "{}: it lies at {}, the elevation model at {}: they do not overlap.{} Remedy: check the systems of both", r.outline,
-                        shown(m.box), shown(all_),
-                        turned.meets(all_) ? " With x and y exchanged they would: are its axes in another order?" : ""));
-                }
-                return 0;
-            });
-        else {
+        if (!r.outline.empty()) {
+            at_key(key + ".outline", [&] { return take_outline(m), 0; });
+        } else {
             const auto& [file, which] = !r.thickness_map.empty() ? std::pair(r.thickness_map, ".thickness_map")
                                         : !r.surface.empty()     ? std::pair(r.surface, ".surface")
                                                                  : std::pair(r.after, ".after");
-            at_key(key + which, [&] {
-                const Mosaic one({file}, crs_);
-                m.box = one.extent();
-                if (!m.box.meets(all_))
-                    throw BadInput(
-                        fmt::format("{}: it lies at {}, the elevation model at {}: they do not overlap. Remedy: check the systems of both",
-                                    file, shown(m.box), shown(all_)));
-                if (!r.thickness_map.empty()) { // only where there is soil
-                    const auto g = one.read({});
-                    m.box = {far, far, -far, -far};
-                    for (int j = 0; j < g.rows; ++j)
-                        for (int i = 0; i < g.columns; ++i)
-                            if (g.at(i, j) > 0)
-                                widen(g.x + (i - 0.5) * g.cell, g.y + (j - 0.5) * g.cell),
-                                    widen(g.x + (i + 0.5) * g.cell, g.y + (j + 0.5) * g.cell);
-                    if (!(m.box.low_x < m.box.high_x)) throw BadInput(fmt::format("{}: no cell of it is thicker than 0", file));
-                }
-                return 0;
-            });
+            at_key(key + which, [&] { return take_extent(m, file), 0; });
         }
         masses_.push_back(std::move(m));
+    }
+
+    static Window nothing()
+    {
+        const double far = std::numeric_limits<double>::infinity();
+        return {far, far, -far, -far};
+    }
+    static void widen(Window& w, double x, double y)
+    {
+        w = {std::min(w.low_x, x), std::min(w.low_y, y), std::max(w.high_x, x), std::max(w.high_y, y)};
+    }
+
+    void take_outline(Mass& m) const
+    {
+        const scene::Release& r = *m.release;
+        m.box = nothing();
+        auto read = read_outlines(r.outline);
+        const auto own = crs_for(read.crs, crs_, r.outline);
+        std::optional<Transform> way;
+        if (!same_crs(own, crs_)) way.emplace(own, crs_, r.outline);
+        for (auto& outline : read.features)
+            for (auto& ring : outline.rings)
+                for (auto& p : ring) {
+                    if (way) p = (*way)(p[0], p[1]);
+                    if (!std::isfinite(p[0]))
+                        throw BadInput(fmt::format("{}: a corner cannot be brought into {}. Remedy: check the outline's system", r.outline,
+                                                   crs_name(crs_)));
+                    widen(m.box, p[0], p[1]);
+                }
+        const bool by_feature = !r.thickness && r.thickness_map.empty() && r.surface.empty() && r.before.empty();
+        for (std::size_t k = 0; k < read.features.size(); ++k) {
+            if (by_feature && !read.features[k].thickness)
+                throw BadInput(fmt::format("{}: feature {}: it has no attribute \"thickness\", and the scene no thickness. Remedy: "
+                                           "thickness = 4.5 beside outline, or "
+                                           "the attribute for every feature",
+                                           r.outline, k + 1));
+            if (by_feature && !(*read.features[k].thickness > 0))
+                throw BadInput(
+                    fmt::format("{}: feature {}: expected a thickness above 0, found {}", r.outline, k + 1, *read.features[k].thickness));
+            m.rings.insert(m.rings.end(), read.features[k].rings.begin(), read.features[k].rings.end());
+        }
+        m.outlines = std::move(read.features);
+        if (!m.box.meets(all_)) {
+            const Window turned{m.box.low_y, m.box.low_x, m.box.high_y, m.box.high_x};
+            throw BadInput(fmt::format(
+                "{}: it lies at {}, the elevation model at {}: they do not overlap.{} Remedy: check the systems of both", r.outline,
+                shown(m.box), shown(all_), turned.meets(all_) ? " With x and y exchanged they would: are its axes in another order?" : ""));
+        }
+    }
+
+    /// The extent of a raster; of thicknesses only where there is soil.
+    void take_extent(Mass& m, const std::string& file) const
+    {
+        const Mosaic one({file}, crs_);
+        m.box = one.extent();
+        if (!m.box.meets(all_))
+            throw BadInput(
+                fmt::format("{}: it lies at {}, the elevation model at {}: they do not overlap. Remedy: check the systems of both", file,
+                            shown(m.box), shown(all_)));
+        if (!m.release->thickness_map.empty()) {
+            const auto g = one.read({});
+            m.box = nothing();
+            for (int j = 0; j < g.rows; ++j)
+                for (int i = 0; i < g.columns; ++i)
+                    if (g.at(i, j) > 0)
+                        widen(m.box, g.x + (i - 0.5) * g.cell, g.y + (j - 0.5) * g.cell),
+                            widen(m.box, g.x + (i + 0.5) * g.cell, g.y + (j + 0.5) * g.cell);
+            if (!(m.box.low_x < m.box.high_x)) throw BadInput(fmt::format("{}: no cell of it is thicker than 0", file));
+        }
     }
 
     /// The window of the scene, or what lies within the reach of its releases.
