@@ -97,6 +97,48 @@ std::vector<std::vector<int>> pieces_of(const BlockGraph& g, std::span<const int
     return pieces;
 }
 
+/// A part that needs to see a block, in one direction.
+struct Request {
+    int part;
+    bool image; // reaches itself or its own part through a period: each such direction is a ghost of its own
+    std::array<std::int8_t, 3> d;
+};
+/// Those of one block, equal parts together.
+void find_requests(const BlockGraph& g, std::span<const int> part, int b, std::vector<Request>& requests)
+{
+    requests.clear();
+    for (const auto& l : g.links(b)) {
+        bool image = false;
+        for (int a = 0; a < 3; ++a) image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
+        if (part[l.block] != part[b] || image) requests.push_back({part[l.block], image, l.d});
+    }
+    std::ranges::stable_sort(requests, {}, [](const Request& w) { return std::pair(w.part, w.image); });
+}
+
+/// The share of a block that lies in a layer near any of these directions.
+class Shares {
+public:
+    explicit Shares(const BlockGrid& grid) : x_(layers(grid.reach[0])), y_(layers(grid.reach[1])), z_(layers(grid.reach[2])) {}
+    double of(std::span<const Request> requests) const
+    {
+        const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
+        double share = 0;
+        for (const auto& lx : x_)
+            for (const auto& ly : y_)
+                for (const auto& lz : z_)
+                    for (const auto& request : requests) {
+                        const auto& d = request.d;
+                        if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2])) continue;
+                        share += lx.share * ly.share * lz.share;
+                        break;
+                    }
+        return share;
+    }
+
+private:
+    decltype(layers(0.0)) x_, y_, z_;
+};
+
 } // namespace
 
 CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
@@ -118,38 +160,15 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
     const double total = std::accumulate(r.work.begin(), r.work.end(), 0.0);
     if (total > 0) r.imbalance = *std::ranges::max_element(r.work) * parts / total;
 
-    const auto x = layers(g.grid.reach[0]), y = layers(g.grid.reach[1]), z = layers(g.grid.reach[2]);
-    const auto touches = [](const Layer& l, int d) { return d == 0 || (d < 0 ? l.low : l.high); };
+    const Shares shares(g.grid);
     std::vector<std::vector<int>> sends(parts);
-    struct Request {
-        int part;
-        bool image; // reaches itself or its own part through a period: each such direction is a ghost of its
-                    // own
-        std::array<std::int8_t, 3> d;
-    };
     std::vector<Request> requests;
     for (int b = 0; b < g.size(); ++b) {
-        requests.clear();
-        for (const auto& l : g.links(b)) {
-            bool image = false;
-            for (int a = 0; a < 3; ++a) image |= l.d[a] != 0 && g.block[b][a] + l.d[a] != g.block[l.block][a];
-            if (part[l.block] != part[b] || image) requests.push_back({part[l.block], image, l.d});
-        }
-        std::ranges::stable_sort(requests, {}, [](const Request& w) { return std::pair(w.part, w.image); });
+        find_requests(g, part, b, requests);
         for (std::size_t from = 0, to; from < requests.size(); from = to) {
             to = from;
             while (to < requests.size() && requests[to].part == requests[from].part && requests[to].image == requests[from].image) ++to;
-            double share = 0;
-            for (const auto& lx : x)
-                for (const auto& ly : y)
-                    for (const auto& lz : z)
-                        for (std::size_t w = from; w < to; ++w) {
-                            const auto& d = requests[w].d;
-                            if (!touches(lx, d[0]) || !touches(ly, d[1]) || !touches(lz, d[2])) continue;
-                            share += lx.share * ly.share * lz.share;
-                            break;
-                        }
-            const double rows = share * g.particles[b];
+            const double rows = shares.of(std::span(requests).subspan(from, to - from)) * g.particles[b];
             r.ghosts[requests[from].part] += rows;
             if (requests[from].part == part[b]) continue;
             r.cut_bytes += rows * g.grid.row_bytes;

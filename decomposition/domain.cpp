@@ -167,54 +167,19 @@ Domain::Moved Domain::migrate(Particles& p) const
 }
 
 // ---- which ranks need which particles as ghosts ---------------------------------------------------------------------
-HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
-{
-    HaloPlan plan;
-    const auto &low = space_.period_low(), &length = space_.period_length();
-    const auto& period = space_.period();
-    std::vector<int> shifts;
-    for (int s = 0; s < 27; ++s) {
-        const int d[3] = {s % 3 - 1, s / 3 % 3 - 1, s / 9 - 1};
-        plan.shift[s] = {d[0] * length[0], d[1] * length[1], d[2] * length[2]};
-        bool possible = true;
-        for (int a = 0; a < 3; ++a) possible = possible && (d[a] == 0 || period[a] > 0);
-        if (!possible) plan.shift[s] = {};
-        else shifts.push_back(s);
-    }
-    for (int a = 0; a < 3; ++a) ensure(period[a] == 0 || reach <= length[a], "the halo reaches further than a period");
-    const auto shift = [&](int s) {
-        const Vector d = plan.shift[s];
-        return std::array<double, 3>{d.x, d.y, d.z};
-    };
+namespace {
 
-    // The particles by block, and the box that each block's particles fill. Blocks are not wrapped here: one
-    // across a period's seam would fill a box as long as the period.
-    std::vector<std::uint64_t> key(n);
-    double largest = 0;
-    bool outside = false;
-    Index lost = -1;
-#pragma omp parallel for schedule(static) reduction(max : largest, lost) reduction(|| : outside) if (n > parallel)
-    for (Index i = 0; i < n; ++i) {
-        Block b;
-        if (!space_.raw_block(x[i], b)) {
-            lost = std::max(lost, i);
-            continue;
-        }
-        key[i] = key_of(b);
-        for (int a = 0; a < 3; ++a) {
-            const double c = x.column[a][i];
-            largest = std::max(largest, std::abs(c));
-            const double slack = 1e-9 * length[a];
-            if (period[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
-        }
-    }
-    stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
-    ensure(!comm_.any(outside), "a halo is planned while particles lie outside the period");
-
-    std::unordered_map<std::uint64_t, int> local;
+/// The particles by block, and the box that each block's particles fill.
+struct ByBlock {
     std::vector<Bounds> box;
+    std::vector<Index> first, member; // of a block's particles in `member`, and the end
+};
+ByBlock by_block(View<Shape::Vector, const double> x, Index n, const std::vector<std::uint64_t>& key)
+{
+    ByBlock all{{}, {0}, std::vector<Index>(n)};
+    auto& [box, first, member] = all;
+    std::unordered_map<std::uint64_t, int> local;
     std::vector<int> group(n);
-    std::vector<Index> first{0};
     for (Index i = 0; i < n; ++i) {
         if (i > 0 && key[i] == key[i - 1]) {
             group[i] = group[i - 1];
@@ -225,7 +190,6 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
         ++first[group[i] + 1];
     }
     for (std::size_t g = 1; g < first.size(); ++g) first[g] += first[g - 1];
-    std::vector<Index> member(n);
     {
         auto next = first;
         for (Index i = 0; i < n; ++i) member[next[group[i]]++] = i;
@@ -233,7 +197,89 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
     const int n_boxes = int(box.size());
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g)
-        for (Index k = first[g]; k < first[g + 1]; ++k) box[g].add(x[member[k]]);
+        for (Index k = all.first[g]; k < all.first[g + 1]; ++k) all.box[g].add(x[all.member[k]]);
+    return all;
+}
+
+/// The images across periods that there can be; sets their lengths in `plan`.
+std::vector<int> possible_shifts(const BlockSpace& space, HaloPlan& plan)
+{
+    const auto& length = space.period_length();
+    const auto& period = space.period();
+    std::vector<int> shifts;
+    for (int s = 0; s < 27; ++s) {
+        const int d[3] = {s % 3 - 1, s / 3 % 3 - 1, s / 9 - 1};
+        plan.shift[s] = {d[0] * length[0], d[1] * length[1], d[2] * length[2]};
+        bool possible = true;
+        for (int a = 0; a < 3; ++a) possible = possible && (d[a] == 0 || period[a] > 0);
+        if (!possible) plan.shift[s] = {};
+        else shifts.push_back(s);
+    }
+    return shifts;
+}
+std::array<double, 3> shift_of(const HaloPlan& plan, int s) { return {plan.shift[s].x, plan.shift[s].y, plan.shift[s].z}; }
+
+/// What a block's particles send: to the peer of this number.
+struct Entry {
+    int peer;
+    HaloPlan::Send send;
+};
+/// Those of one block's particles that a peer's boxes are near.
+void find_sends(View<Shape::Vector, const double> x, std::span<const Index> members, const double* d, int peer, int shift, double reach2,
+                std::vector<const Bounds*>& near, std::vector<Entry>& found)
+{
+    for (const Index i : members)
+        for (const Bounds*& b : near) {
+            if (squared_distance(x[i], d, *b) > reach2) continue;
+            found.push_back({peer, {i, shift}});
+            std::swap(b, near.front()); // the next particle is probably near the same box
+            break;
+        }
+}
+
+} // namespace
+
+std::vector<std::uint64_t> Domain::block_keys(View<Shape::Vector, const double> x, Index n, double& largest) const
+{
+    const auto &low = space_.period_low(), &length = space_.period_length();
+    const auto& period = space_.period();
+    // Blocks are not wrapped here: one across a period's seam would fill a box as long as the period.
+    std::vector<std::uint64_t> key(n);
+    double most = 0;
+    bool outside = false;
+    Index lost = -1;
+#pragma omp parallel for schedule(static) reduction(max : most, lost) reduction(|| : outside) if (n > parallel)
+    for (Index i = 0; i < n; ++i) {
+        Block b;
+        if (!space_.raw_block(x[i], b)) {
+            lost = std::max(lost, i);
+            continue;
+        }
+        key[i] = key_of(b);
+        for (int a = 0; a < 3; ++a) {
+            const double c = x.column[a][i];
+            most = std::max(most, std::abs(c));
+            const double slack = 1e-9 * length[a];
+            if (period[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
+        }
+    }
+    stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
+    ensure(!comm_.any(outside), "a halo is planned while particles lie outside the period");
+    largest = most;
+    return key;
+}
+
+HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
+{
+    HaloPlan plan;
+    const std::vector<int> shifts = possible_shifts(space_, plan);
+    const auto& length = space_.period_length();
+    for (int a = 0; a < 3; ++a) ensure(space_.period()[a] == 0 || reach <= length[a], "the halo reaches further than a period");
+
+    double largest = 0;
+    const std::vector<std::uint64_t> key = block_keys(x, n, largest);
+    const ByBlock blocks = by_block(x, n, key);
+    const auto& box = blocks.box;
     Bounds whole = Bounds::none();
     for (const auto& b : box) whole.add(b.low, b.high);
 
@@ -250,42 +296,31 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
             if (shifts.size() > 1) p.items = box;
         } else {
             for (const auto& b : box)
-                if (std::ranges::any_of(shifts, [&](int s) { return squared_distance(b, shift(s).data(), wholes[r]) <= reach2; }))
+                if (std::ranges::any_of(shifts, [&](int s) { return squared_distance(b, shift_of(plan, s).data(), wholes[r]) <= reach2; }))
                     p.items.push_back(b);
         }
         if (!p.items.empty()) out.push_back(std::move(p));
     }
     const auto theirs = comm_.exchange(out);
 
-    struct Entry {
-        int peer;
-        HaloPlan::Send send;
-    };
+    const int n_boxes = int(box.size());
     std::vector<std::vector<Entry>> found(n_boxes);
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g) {
         std::vector<const Bounds*> near;
-        for (int peer = 0; peer < int(theirs.size()); ++peer) {
-            const auto& them = theirs[peer];
+        for (int peer = 0; peer < int(theirs.size()); ++peer)
             for (const int s : shifts) {
+                const auto& them = theirs[peer];
                 if (them.rank == comm_.rank() && s == HaloPlan::no_shift) continue;
-                const auto d = shift(s);
+                const auto d = shift_of(plan, s);
                 if (squared_distance(box[g], d.data(), wholes[them.rank]) > reach2) continue;
                 near.clear();
                 for (const auto& b : them.items)
                     if (squared_distance(box[g], d.data(), b) <= reach2) near.push_back(&b);
                 if (near.empty()) continue;
-                for (Index k = first[g]; k < first[g + 1]; ++k) {
-                    const Index i = member[k];
-                    for (const Bounds*& b : near) {
-                        if (squared_distance(x[i], d.data(), *b) > reach2) continue;
-                        found[g].push_back({peer, {i, s}});
-                        std::swap(b, near.front()); // the next particle is probably near the same box
-                        break;
-                    }
-                }
+                const std::span<const Index> members(blocks.member.data() + blocks.first[g], blocks.member.data() + blocks.first[g + 1]);
+                find_sends(x, members, d.data(), peer, s, reach2, near, found[g]);
             }
-        }
     }
     for (const auto& them : theirs) plan.peers.push_back({them.rank, {}});
     for (const auto& f : found)

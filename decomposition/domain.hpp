@@ -74,6 +74,8 @@ public:
     const BlockSpace& space() const { return space_; }
 
 private:
+    /// Blocks of particles, and the largest of their coordinates (m). Collective.
+    std::vector<std::uint64_t> block_keys(View<Shape::Vector, const double> x, Index n, double& largest) const;
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 

@@ -63,12 +63,46 @@ Halo::~Halo()
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
 }
 
+/// Persistent messages for rows of so many bytes, in the order of `counts`, what comes from each rank.
+Halo::Channel Halo::open_channel(std::size_t bytes, const std::vector<MessageOf<std::int64_t>>& counts)
+{
+    Impl& m = *impl_;
+    const Comm& comm = m.comm;
+    const MPI_Comm mpi_comm = comm.native() ? *static_cast<const MPI_Comm*>(comm.native()) : MPI_COMM_NULL; // none without MPI
+    Channel channel{bytes, {}, {}};
+    m.row.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
+    auto& requests = m.channels.emplace_back();
+    Index first = 0;
+    for (const auto& c : counts) {
+        const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * bytes};
+        if (c.rank != comm.rank()) {
+            requests.push_back(MPI_REQUEST_NULL);
+            check(MPI_Recv_init(in.rows, in.n, m.row.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
+        }
+        channel.in.push_back(in);
+        first += in.n;
+    }
+    std::byte* rows = m.outgoing.data();
+    for (const auto& p : m.plan.peers) {
+        if (p.sends.empty()) continue;
+        Out out{p.sends.data(), Index(p.sends.size()), rows};
+        if (p.rank == comm.rank()) {
+            out.rows = channel.in[m.self].rows;
+        } else {
+            rows += std::size_t(out.n) * bytes;
+            requests.push_back(MPI_REQUEST_NULL);
+            check(MPI_Send_init(out.rows, out.n, m.row.back().type, p.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Send_init");
+        }
+        channel.out.push_back(out);
+    }
+    return channel;
+}
+
 Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_bytes) : impl_(std::make_unique<Impl>(comm, std::move(plan)))
 {
     ensure(!row_bytes.empty() && std::ranges::min(row_bytes) > 0, "a halo's rows have at least one byte");
     Impl& m = *impl_;
     const std::size_t longest = std::ranges::max(row_bytes);
-    const MPI_Comm mpi_comm = comm.native() ? *static_cast<const MPI_Comm*>(comm.native()) : MPI_COMM_NULL; // none without MPI
 
     std::vector<MessageOf<std::int64_t>> counts;
     std::int64_t n_in = 0;
@@ -95,33 +129,7 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
 
     for (const std::size_t bytes : row_bytes) {
         if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.row_bytes == bytes; })) continue;
-        Channel channel{bytes, {}, {}};
-        m.row.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
-        auto& requests = m.channels.emplace_back();
-        Index first = 0;
-        for (const auto& c : counts) {
-            const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * bytes};
-            if (c.rank != comm.rank()) {
-                requests.push_back(MPI_REQUEST_NULL);
-                check(MPI_Recv_init(in.rows, in.n, m.row.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
-            }
-            channel.in.push_back(in);
-            first += in.n;
-        }
-        std::byte* rows = m.outgoing.data();
-        for (const auto& p : m.plan.peers) {
-            if (p.sends.empty()) continue;
-            Out out{p.sends.data(), Index(p.sends.size()), rows};
-            if (p.rank == comm.rank()) {
-                out.rows = channel.in[m.self].rows;
-            } else {
-                rows += std::size_t(out.n) * bytes;
-                requests.push_back(MPI_REQUEST_NULL);
-                check(MPI_Send_init(out.rows, out.n, m.row.back().type, p.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Send_init");
-            }
-            channel.out.push_back(out);
-        }
-        channels_.push_back(std::move(channel));
+        channels_.push_back(open_channel(bytes, counts));
     }
     m.finished.resize(std::size_t(n_requests));
     slot_.resize(m.n_ghosts);

@@ -44,8 +44,7 @@ public:
     Index n_ghosts() const;
     const HaloPlan& plan() const;
 
-    /// One Row per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Row.
-    /// Collective.
+    /// One Row per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Row. Collective.
     template <class Row, class Make> std::vector<Row> collect(Make make) const
     {
         static_assert(std::is_trivially_copyable_v<Row>);
@@ -61,8 +60,7 @@ public:
         ensure(rows.size() == std::size_t(n_ghosts()), "a halo delivers another number of ghosts than planned");
         return rows;
     }
-    /// Where each ghost was sorted (shifted), its id and soil (0 where the store has no soil column).
-    /// Collective.
+    /// Where each ghost was sorted (shifted), its id and soil (0 where the store has no soil column). Collective.
     std::vector<Ghost> ghosts(const Particles&) const;
 
     /// Row k of an arrival goes to slot[k] from now on; the identity before the first call.
@@ -126,6 +124,7 @@ private:
     const Comm& comm() const;
     const Channel& now() const { return channels_[current_]; }
     int n_out() const { return int(channels_.front().out.size()); }
+    Channel open_channel(std::size_t row_bytes, const std::vector<MessageOf<std::int64_t>>& counts);
     void start_receives(std::size_t row_bytes);
     void start_send(int peer);
     int next_arrival();

@@ -21,8 +21,7 @@ public:
     /// After every so many steps: the seconds this rank worked since the last call, waiting excluded. True,
     /// on every rank, if a cut pays now. Collective.
     bool due(const Team&, double busy_seconds);
-    /// After a new cut: the seconds it cost, migration and list building included (the longest rank counts).
-    /// Collective.
+    /// After a new cut: the seconds it cost, migration and list building included (the longest rank counts). Collective.
     void cut(const Team&, double seconds);
 
     /// Of the last call of due().

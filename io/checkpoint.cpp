@@ -174,6 +174,62 @@ void read_table(const Team& team, const H5Reader& in, const TableEntry& t, std::
     });
 }
 
+/// Before memory is taken: every table has the rows and columns that the manifest names, and every field is known; `into` gets them.
+void check_tables(const H5Reader& in, const Manifest& m, Particles* into)
+{
+    const auto total = std::uint64_t(m.what.particles);
+    for (const auto& f : m.fields)
+        if (const auto t = in.table(table_name(f.name)); t.rows != total || t.components != f.components)
+            in.refuse(fmt::format("damaged: table {} is {} x {}, expected {} x {}", table_name(f.name), t.rows, t.components, total,
+                                  f.components));
+    std::size_t known = 0;
+    std::apply(
+        [&](auto... f) {
+            (std::for_each(m.fields.begin(), m.fields.end(),
+                           [&](const FieldEntry& e) {
+                               if (e.name != f.name) return;
+                               if (e.components != f.components)
+                                   in.refuse(fmt::format("field {} has {} components, expected {}", f.name, e.components, f.components));
+                               ++known;
+                               if (into) into->require(f);
+                           }),
+             ...);
+        },
+        AllFields{});
+    if (known != m.fields.size()) in.refuse("holds fields this version of kuzure does not know: use the version that wrote it");
+    if (!into) return;
+    into->for_each_present([&](auto f) {
+        if (std::none_of(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; }))
+            in.refuse(fmt::format("lacks the field '{}', which this run needs: the scene's effects have changed", f.name));
+    });
+}
+
+/// Reads and checks this rank's rows of a field that the file has.
+template <class Field>
+void read_field(const Team& team, const H5Reader& in, const Manifest& m, std::uint64_t first, std::uint64_t count, Field f, Particles* into)
+{
+    using T = typename decltype(f)::Number;
+    const auto entry = std::find_if(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; });
+    if (entry == m.fields.end()) return;
+    std::uint64_t sum = 0;
+    guarded_on(team, in.file(), [&] {
+        std::vector<T> rows;
+        for (std::uint64_t at = 0; at < count; at += rows_at_a_time) {
+            const auto n = std::min(rows_at_a_time, count - at);
+            in.rows(table_name(f.name), first + at, n, f.components, rows);
+            sum += sum_of_rows(std::span<const T>(rows), f.components, first + at);
+            if (!into) continue;
+            const auto view = (*into)[f];
+            for (std::uint64_t i = 0; i < n; ++i)
+                for (int c = 0; c < f.components; ++c) view.column[c][at + i] = rows[i * f.components + c];
+        }
+    });
+    sum = sum_over_ranks(team, sum);
+    guarded_on(team, in.file(), [&] {
+        if (hex(sum) != entry->checksum) in.refuse(fmt::format("damaged: the checksum of {} does not fit", table_name(f.name)));
+    });
+}
+
 /// Reads and checks the rows of this rank, field by field; keeps them in `into` if there is one.
 Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H5Reader> in, Particles* into)
 {
@@ -190,66 +246,17 @@ Checkpoint read_all(const Team& team, const Place& file, std::shared_ptr<const H
         if (m.text != first_says) in->refuse("it was replaced by another while it was being opened: start again");
     });
     guarded([&] {
-        const auto total = std::uint64_t(m.what.particles);
-        const Share mine(team, total);
+        const Share mine(team, std::uint64_t(m.what.particles));
         first = mine.first, count = mine.count;
         if (count > std::uint64_t(std::numeric_limits<Index>::max()) - 2 * Particles::padding)
-            in->refuse(fmt::format("{} particles are too many for {} ranks", total, team.size()));
-        // Before memory is taken: every table has the rows and columns that the manifest names.
-        for (const auto& f : m.fields)
-            if (const auto t = in->table(table_name(f.name)); t.rows != total || t.components != f.components)
-                in->refuse(fmt::format("damaged: table {} is {} x {}, expected {} x {}", table_name(f.name), t.rows, t.components, total,
-                                       f.components));
-        std::size_t known = 0;
-        std::apply(
-            [&](auto... f) {
-                (std::for_each(m.fields.begin(), m.fields.end(),
-                               [&](const FieldEntry& e) {
-                                   if (e.name != f.name) return;
-                                   if (e.components != f.components)
-                                       in->refuse(
-                                           fmt::format("field {} has {} components, expected {}", f.name, e.components, f.components));
-                                   ++known;
-                                   if (into) into->require(f);
-                               }),
-                 ...);
-            },
-            AllFields{});
-        if (known != m.fields.size()) in->refuse("holds fields this version of kuzure does not know: use the version that wrote it");
-        if (into) {
-            into->for_each_present([&](auto f) {
-                if (std::none_of(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; }))
-                    in->refuse(fmt::format("lacks the field '{}', which this run needs: the scene's effects have changed", f.name));
-            });
-            into->resize(0);
-            into->resize(Index(count));
-        }
+            in->refuse(fmt::format("{} particles are too many for {} ranks", m.what.particles, team.size()));
+        check_tables(*in, m, into);
+        if (!into) return;
+        into->resize(0);
+        into->resize(Index(count));
     });
-
-    const auto read_field = [&](auto f) {
-        using T = typename decltype(f)::Number;
-        const auto entry = std::find_if(m.fields.begin(), m.fields.end(), [&](const FieldEntry& e) { return e.name == f.name; });
-        if (entry == m.fields.end()) return;
-        std::uint64_t sum = 0;
-        guarded([&] {
-            std::vector<T> rows;
-            for (std::uint64_t at = 0; at < count; at += rows_at_a_time) {
-                const auto n = std::min(rows_at_a_time, count - at);
-                in->rows(table_name(f.name), first + at, n, f.components, rows);
-                sum += sum_of_rows(std::span<const T>(rows), f.components, first + at);
-                if (!into) continue;
-                const auto view = (*into)[f];
-                for (std::uint64_t i = 0; i < n; ++i)
-                    for (int c = 0; c < f.components; ++c) view.column[c][at + i] = rows[i * f.components + c];
-            }
-        });
-        sum = sum_over_ranks(team, sum);
-        guarded([&] {
-            if (hex(sum) != entry->checksum) in->refuse(fmt::format("damaged: the checksum of {} does not fit", table_name(f.name)));
-        });
-    };
     try {
-        std::apply([&](auto... f) { (read_field(f), ...); }, AllFields{});
+        std::apply([&](auto... f) { (read_field(team, *in, m, first, count, f, into), ...); }, AllFields{});
         if (!into)
             for (const auto& t : m.tables) read_table(team, *in, t, nullptr);
     } catch (...) {

@@ -82,6 +82,15 @@ std::optional<Mismatch> wrong_choices(const Key& key, const toml::node& node)
     return {};
 }
 
+std::optional<Mismatch> wrong_texts(const toml::node& node)
+{
+    if (!node.is_array()) return Mismatch{described(node), {}};
+    for (const auto& element : *node.as_array())
+        if (!element.is_string() || !not_one_line(element.as_string()->get()).empty())
+            return Mismatch{described(element) + " among them", {}};
+    return {};
+}
+
 std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
 {
     const auto unless = [&](bool right) { return right ? std::nullopt : std::optional(Mismatch{described(node), {}}); };
@@ -128,14 +137,9 @@ std::optional<Mismatch> mismatch(const Key& key, const toml::node& node)
         return unless(node.is_table() && !node.as_table()->empty());
     case Kind::TextOrTexts:
         if (node.is_string()) return unless(not_one_line(node.as_string()->get()).empty());
-        if (node.is_array() && node.as_array()->empty()) return unless(false);
-        [[fallthrough]];
+        return node.is_array() && node.as_array()->empty() ? unless(false) : wrong_texts(node);
     case Kind::Texts:
-        if (!node.is_array()) return unless(false);
-        for (const auto& element : *node.as_array())
-            if (!element.is_string() || !not_one_line(element.as_string()->get()).empty())
-                return Mismatch{described(element) + " among them", {}};
-        return {};
+        return wrong_texts(node);
     case Kind::Tables:
         if (!node.is_array() || (node.as_array()->empty() && key.need == Need::Required)) return unless(false);
         for (const auto& element : *node.as_array())

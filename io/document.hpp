@@ -69,6 +69,7 @@ private:
     std::size_t line_of(const std::string& path) const;
     std::pair<std::string, std::size_t> location_and_line(const std::string& path) const;
     void override_with(const std::string& set);
+    toml::table& table_for(const std::string& path, const std::vector<std::string_view>& parts, const std::string& set);
     void complain_unknown(const std::string& path, std::string_view leaf, std::string_view pattern);
     void check_table(toml::table&, const std::string& path);
     void check_alternatives(const toml::table&, const std::string& path, const std::string& pattern);

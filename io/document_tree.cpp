@@ -168,6 +168,41 @@ std::pair<std::string, std::size_t> Document::location_and_line(const std::strin
     return {fmt::format("{}:{}", name_, line), line};
 }
 
+/// The table that a --set writes into, made where it is missing.
+toml::table& Document::table_for(const std::string& path, const std::vector<std::string_view>& parts, const std::string& set)
+{
+    const auto location = "--set " + set;
+    const auto path_to = [&](std::size_t n) { return fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(n), ".")); };
+    toml::node* node = &root;
+    for (std::size_t k = 0; k + 1 < parts.size(); ++k) {
+        if (auto* table = node->as_table()) {
+            if (!table->contains(parts[k])) {
+                table->insert(parts[k], toml::table{});
+                made_.emplace_back(path_to(k + 1), set);
+            }
+            node = table->get(parts[k]);
+            // "rough" and "auto" give way to a table that is set key by key.
+            const Key* here = keys_.find(path_to(k + 1));
+            if (here && here->kind == Kind::ChoiceOrTable && !node->is_table()) {
+                table->insert_or_assign(parts[k], toml::table{});
+                node = table->get(parts[k]);
+            }
+        } else if (auto* array = node->as_array()) {
+            const auto i = as_index(parts[k]);
+            node = i ? array->get(*i) : nullptr;
+            if (!node)
+                throw BadInput(fmt::format("{}: expected a number from 0 to {} after {}, found {}; the file has {} of them", location,
+                                           std::int64_t(array->size()) - 1, parts[k - 1], parts[k], array->size()));
+        } else node = nullptr;
+        if (!node) break;
+    }
+    auto* table = node ? node->as_table() : nullptr;
+    if (!table)
+        throw BadInput(
+            fmt::format("{}: expected a key inside a table, found {}, which is none; see the reference of its keys", location, path));
+    return *table;
+}
+
 void Document::override_with(const std::string& set)
 {
     const auto location = "--set " + set;
@@ -202,35 +237,9 @@ void Document::override_with(const std::string& set)
         parsed.insert("v", value);
     }
 
-    toml::node* node = &root;
-    for (std::size_t k = 0; k + 1 < parts.size(); ++k) {
-        if (auto* table = node->as_table()) {
-            if (!table->contains(parts[k])) {
-                table->insert(parts[k], toml::table{});
-                made_.emplace_back(fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")), set);
-            }
-            node = table->get(parts[k]);
-            // "rough" and "auto" give way to a table that is set key by key.
-            const Key* here = keys_.find(fmt::format("{}", fmt::join(parts.begin(), parts.begin() + std::ptrdiff_t(k) + 1, ".")));
-            if (here && here->kind == Kind::ChoiceOrTable && !node->is_table()) {
-                table->insert_or_assign(parts[k], toml::table{});
-                node = table->get(parts[k]);
-            }
-        } else if (auto* array = node->as_array()) {
-            const auto i = as_index(parts[k]);
-            node = i ? array->get(*i) : nullptr;
-            if (!node)
-                throw BadInput(fmt::format("{}: expected a number from 0 to {} after {}, found {}; the file has {} of them", location,
-                                           std::int64_t(array->size()) - 1, parts[k - 1], parts[k], array->size()));
-        } else node = nullptr;
-        if (!node) break;
-    }
-    auto* table = node ? node->as_table() : nullptr;
-    if (!table)
-        throw BadInput(
-            fmt::format("{}: expected a key inside a table, found {}, which is none; see the reference of its keys", location, path));
-    if (!table->contains(parts.back())) made_.emplace_back(path, set);
-    table->insert_or_assign(parts.back(), *parsed.get("v"));
+    toml::table& table = table_for(path, parts, set);
+    if (!table.contains(parts.back())) made_.emplace_back(path, set);
+    table.insert_or_assign(parts.back(), *parsed.get("v"));
     sets_.emplace_back(path, set);
 }
 

@@ -37,8 +37,18 @@ private:
     struct Stamps; // discs of a ball, at fractions of a sample
     struct Scratch;
     struct Desks;
+    struct Band;
+    struct WallPixels;
+    struct Part;
     std::shared_ptr<Scratch> borrow() const;
     void draw_walls(std::span<const Vector> walls);
+    void take_wall_row(const Band&, int from, int y, WallPixels& to);
+    void shade_walls(const WallPixels&);
+    void stamp(const Moment&, const Part&, Scratch&) const;
+    void hide_behind_walls(const Part&, Scratch&) const;
+    void find_depths(const Part&, Scratch&) const;
+    void shade(const Part&, Scratch&) const;
+    void write_on(const Moment&, std::size_t outside, Scratch&) const;
     void draw_axes(bool flat);
     void draw_color_bar(const Quantity&);
 

@@ -110,67 +110,114 @@ void remove_pictures(const Team& team, const Place& results)
     });
 }
 
-Drawn draw_pictures(const Team& team, const PictureTask& task)
-{
-    if (!can_draw()) Canvas(1, 1); // says why and what helps
-    auto states = states_of(team, task.results);
-    const bool flat = task.dimensions == 2;
-    const scene::View view = flat ? scene::View::Side : task.view;
-    const bool cut = view == scene::View::Cut;
+namespace {
 
-    // The first good snapshot knows what there is to show; it is known to all from here on.
-    std::size_t first = 0;
-    double middle = 0; // m, where the slice is cut
-    on_root(team, [&] {
-        for (;; ++first) {
-            try {
-                const H5Reader in(states[first].file);
-                const SoilColor color(in, task.color);
-                if (!cut) break;
-                const auto soil = color.read(in);
-                const Reach r = reach_of(soil.positions, {});
-                if (!r.all.empty()) middle = 0.5 * (r.all.low.y + r.all.high.y);
-                break;
-            } catch (const IoFailed&) {
-                if (!task.tolerant || first + 1 == states.size()) throw;
-            }
-        }
-    });
-    first = std::size_t(team.max(std::int64_t(first)));
-    middle = team.max(team.rank() == 0 ? middle : -HUGE_VAL);
-    const auto in_slice = [&](const Vector& p) { return !cut || std::fabs(p.y - middle) <= task.spacing; };
-
-    std::string complaint; // the first of this rank
-    std::vector<std::string> warnings;
-    std::mutex saying;
-    const auto complain = [&](std::string& to, const std::string& what) {
-        const std::lock_guard lock(saying);
-        if (to.empty()) to = what;
-    };
-    std::optional<SoilColor> color;
-    try {
-        color.emplace(H5Reader(states[first].file), task.color);
-    } catch (const std::exception& e) {
-        complaint = e.what();
+/// The pictures of one task, drawn by all ranks: each reads and draws every so many states.
+class Series {
+public:
+    Series(const Team& team, const PictureTask& task)
+        : team_(team), task_(task), states_(states_of(team, task.results)), flat_(task.dimensions == 2),
+          view_(flat_ ? scene::View::Side : task.view)
+    {
     }
-    agree(team, complaint);
+    Drawn draw()
+    {
+        find_first();
+        open_color();
+        first_file_ = states_[first_].file;
+        const Reach all = survey();
+        digits_ = decimals(states_);
+        if (task_.at) keep_only(*task_.at);
+        Drawn drawn;
+        for (const auto& s : states_)
+            if (!s.damaged) drawn.files.push_back(file_of(s).path());
+        try {
+            paint(all);
+        } catch (const std::exception& e) {
+            complaint_ = e.what();
+        }
+        agree(team_, complaint_);
+        drawn.warnings = all_warnings();
+        return drawn;
+    }
 
-    // Once over all states: how far the soil comes, and between which values.
-    const auto read = [&](State& s) {
+private:
+    /// What all pictures share.
+    struct Look {
+        Extent frame;
+        ColorRange range;
+    };
+    bool in_slice(const Vector& p) const { return view_ != scene::View::Cut || std::fabs(p.y - middle_) <= task_.spacing; }
+    Place file_of(const State& s) const { return task_.file ? task_.file(s.number) : picture_file(task_.results, s.number); }
+    void complain(const std::string& what)
+    {
+        const std::lock_guard lock(saying_);
+        if (complaint_.empty()) complaint_ = what;
+    }
+    SoilColor::Soil read(State& s) const
+    {
         SoilColor::Soil soil;
         {
             const std::lock_guard lock(hdf5);
-            soil = color->read(H5Reader(s.file));
+            soil = color_->read(H5Reader(s.file));
         }
         s.time = soil.time;
         return soil;
-    };
-    const auto n = int(states.size()), me = team.rank(), ranks = team.size();
-    std::vector<Reach> reach(states.size()), broken(states.size());
-    std::size_t kept = 0;
+    }
+
+    /// The first good snapshot knows what there is to show; it is known to all from here on.
+    void find_first()
+    {
+        on_root(team_, [&] {
+            for (;; ++first_) {
+                try {
+                    const H5Reader in(states_[first_].file);
+                    const SoilColor color(in, task_.color);
+                    if (view_ != scene::View::Cut) break;
+                    const auto soil = color.read(in);
+                    const Reach r = reach_of(soil.positions, {});
+                    if (!r.all.empty()) middle_ = 0.5 * (r.all.low.y + r.all.high.y);
+                    break;
+                } catch (const IoFailed&) {
+                    if (!task_.tolerant || first_ + 1 == states_.size()) throw;
+                }
+            }
+        });
+        first_ = std::size_t(team_.max(std::int64_t(first_)));
+        middle_ = team_.max(team_.rank() == 0 ? middle_ : -HUGE_VAL);
+    }
+
+    void open_color()
+    {
+        try {
+            color_.emplace(H5Reader(states_[first_].file), task_.color);
+        } catch (const std::exception& e) {
+            complaint_ = e.what();
+        }
+        agree(team_, complaint_);
+    }
+
+    /// Once over all states: how far the soil comes, and between which values.
+    Reach survey()
+    {
+        std::vector<Reach> reach(states_.size()), broken(states_.size());
+        const int n = int(states_.size()), me = team_.rank(), ranks = team_.size();
 #pragma omp parallel for schedule(dynamic, 1)
-    for (int k = me; k < n; k += ranks) {
-        State& s = states[std::size_t(k)];
+        for (int k = me; k < n; k += ranks) survey(states_[std::size_t(k)], reach[std::size_t(k)], broken[std::size_t(k)]);
+        agree(team_, complaint_);
+        std::vector<double> times;
+        for (const auto& s : states_) times.push_back(s.time);
+        team_.max(std::span<double>(times));
+        for (std::size_t k = 0; k < states_.size(); ++k) states_[k].time = times[k], states_[k].damaged = times[k] == -HUGE_VAL;
+        Reach all, failed;
+        for (const auto& r : reach) all = joined(all, r);
+        for (const auto& r : broken) failed = joined(failed, r);
+        all = over_ranks(team_, all), failed = over_ranks(team_, failed);
+        // Of a state whose numbers failed, positions and values can be anything.
+        return all.all.empty() ? failed : all;
+    }
+    void survey(State& s, Reach& reach, Reach& broken)
+    {
         s.mine = true;
         try {
             auto soil = read(s);
@@ -178,108 +225,124 @@ Drawn draw_pictures(const Team& team, const PictureTask& task)
             std::vector<Vector> positions;
             for (std::size_t i = 0; i < soil.positions.size(); ++i)
                 if (in_slice(soil.positions[i])) values.push_back(soil.values[i]), positions.push_back(soil.positions[i]);
-            (soil.broken ? broken : reach)[std::size_t(k)] = reach_of(soil.positions, values);
+            (soil.broken ? broken : reach) = reach_of(soil.positions, values);
             soil.positions = std::move(positions), soil.values = std::move(values);
-            const std::lock_guard lock(saying);
-            kept += soil.values.size() * (sizeof(Vector) + sizeof(double));
-            if (kept <= keep_bytes) s.soil = std::move(soil), s.kept = true;
+            const std::lock_guard lock(saying_);
+            kept_ += soil.values.size() * (sizeof(Vector) + sizeof(double));
+            if (kept_ <= keep_bytes) s.soil = std::move(soil), s.kept = true;
         } catch (const IoFailed& e) {
             s.damaged = true;
-            const std::lock_guard lock(saying);
-            if (task.tolerant) warnings.push_back(fmt::format("no picture of a damaged snapshot: {}", e.what()));
-            else if (complaint.empty()) complaint = e.what();
+            const std::lock_guard lock(saying_);
+            if (task_.tolerant) warnings_.push_back(fmt::format("no picture of a damaged snapshot: {}", e.what()));
+            else if (complaint_.empty()) complaint_ = e.what();
         } catch (const std::exception& e) {
-            complain(complaint, e.what());
+            complain(e.what());
         }
     }
-    agree(team, complaint);
-    std::vector<double> times;
-    for (const auto& s : states) times.push_back(s.time);
-    team.max(std::span<double>(times));
-    for (std::size_t k = 0; k < states.size(); ++k) states[k].time = times[k], states[k].damaged = times[k] == -HUGE_VAL;
-    Reach all, failed;
-    for (const auto& r : reach) all = joined(all, r);
-    for (const auto& r : broken) failed = joined(failed, r);
-    all = over_ranks(team, all), failed = over_ranks(team, failed);
-    // Of a state whose numbers failed, positions and values can be anything.
-    if (all.all.empty()) all = failed;
 
-    const int digits = decimals(states);
-    const Place first_file = states[first].file;
-    if (task.at) {
+    /// The state that is nearest to a time (s), for the root to draw.
+    void keep_only(double wanted)
+    {
         std::size_t next = 0;
         double begin = HUGE_VAL, end = -HUGE_VAL;
-        for (const auto& s : states)
+        for (const auto& s : states_)
             if (!s.damaged) begin = std::min(begin, s.time), end = std::max(end, s.time);
-        const double at = std::isinf(*task.at) ? end : *task.at, slack = 1e-9 * std::max(std::fabs(begin), std::fabs(end));
+        const double at = std::isinf(wanted) ? end : wanted, slack = 1e-9 * std::max(std::fabs(begin), std::fabs(end));
         if (!(at >= begin - slack && at <= end + slack))
             throw BadInput(fmt::format("--at {:g}: expected a time from {:g} to {:g} s, between the first and the last snapshot of {}", at,
-                                       begin, end, task.results.string()));
-        for (std::size_t k = 0; k < states.size(); ++k)
-            if (states[k].damaged == false && (states[next].damaged || std::fabs(states[k].time - at) < std::fabs(states[next].time - at)))
+                                       begin, end, task_.results.string()));
+        for (std::size_t k = 0; k < states_.size(); ++k)
+            if (!states_[k].damaged && (states_[next].damaged || std::fabs(states_[k].time - at) < std::fabs(states_[next].time - at)))
                 next = k;
-        for (std::size_t k = 0; k < states.size(); ++k) states[k].mine = k == next && me == 0;
-        states = {std::move(states[next])};
+        for (std::size_t k = 0; k < states_.size(); ++k) states_[k].mine = k == next && team_.rank() == 0;
+        states_ = {std::move(states_[next])};
     }
 
-    Drawn drawn;
-    std::vector<State*> mine;
-    for (auto& s : states) {
-        if (s.damaged) continue;
-        drawn.files.push_back((task.file ? task.file(s.number) : picture_file(task.results, s.number)).path());
-        if (s.mine) mine.push_back(&s);
+    Painter painter_with(const Look& look, const std::vector<Vector>& walls) const
+    {
+        std::vector<Vector> shown;
+        for (const Vector& w : walls)
+            if (in_slice(w)) shown.push_back(w);
+        return Painter(stage_of(look.frame, view_), look.range, color_->quantity(), task_.title, task_.spacing, shown, flat_);
     }
-    if (!mine.empty()) try {
-            const auto walls = walls_of(first_file);
-            const Extent frame = frame_of(all, reach_of(walls, {}).all, task.dimensions, task.spacing);
-            const ColorRange range = color_range(all, color->has_signs(), task.range);
-            const auto painter_with = [&](const std::vector<Vector>& all_walls) {
-                std::vector<Vector> shown;
-                for (const Vector& w : all_walls)
-                    if (in_slice(w)) shown.push_back(w);
-                return Painter(stage_of(frame, view), range, color->quantity(), task.title, task.spacing, shown, flat);
-            };
-            // Walls that events change are in every snapshot.
-            const bool walls_change = !exists(first_file.beside("walls.hdf")) && !walls.empty();
-            const Painter painter = painter_with(walls);
-            if (me == 0 && !painter.missing().empty())
-                warnings.push_back(
-                    fmt::format("no font here has \"{}\": pictures show boxes. Remedy: apt-get install fonts-ipafont-gothic, or "
-                                "another font that has them, then kuzure picture {}",
-                                painter.missing(), task.results.string()));
+
+    void paint(const Reach& all)
+    {
+        std::vector<State*> mine;
+        for (auto& s : states_)
+            if (!s.damaged && s.mine) mine.push_back(&s);
+        if (mine.empty()) return;
+        const auto walls = walls_of(first_file_);
+        // Walls that events change are in every snapshot.
+        const bool walls_change = !exists(first_file_.beside("walls.hdf")) && !walls.empty();
+        const Look look{frame_of(all, reach_of(walls, {}).all, task_.dimensions, task_.spacing),
+                        color_range(all, color_->has_signs(), task_.range)};
+        const Painter painter = painter_with(look, walls);
+        if (team_.rank() == 0 && !painter.missing().empty())
+            warnings_.push_back(
+                fmt::format("no font here has \"{}\": pictures show boxes. Remedy: apt-get install fonts-ipafont-gothic, or "
+                            "another font that has them, then kuzure picture {}",
+                            painter.missing(), task_.results.string()));
 #pragma omp parallel for schedule(dynamic, 1)
-            for (std::size_t k = 0; k < mine.size(); ++k) {
+        for (std::size_t k = 0; k < mine.size(); ++k) {
+            try {
                 State& s = *mine[k];
-                try {
-                    if (!s.kept) {
-                        s.soil = read(s);
-                        std::size_t to = 0;
-                        for (std::size_t i = 0; i < s.soil.positions.size(); ++i)
-                            if (in_slice(s.soil.positions[i]))
-                                s.soil.positions[to] = s.soil.positions[i], s.soil.values[to++] = s.soil.values[i];
-                        s.soil.positions.resize(to), s.soil.values.resize(to);
-                    }
-                    const Moment moment{s.soil.positions, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits), s.soil.failed};
-                    write_lightly(task.file ? task.file(s.number) : picture_file(task.results, s.number),
-                                  walls_change ? painter_with(walls_of(s.file)).draw(moment) : painter.draw(moment));
-                    s.soil = {};
-                } catch (const std::exception& e) {
-                    complain(complaint, e.what());
-                }
+                take_soil(s);
+                const Moment moment{s.soil.positions, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits_), s.soil.failed};
+                write_lightly(file_of(s), walls_change ? painter_with(look, walls_of(s.file)).draw(moment) : painter.draw(moment));
+                s.soil = {};
+            } catch (const std::exception& e) {
+                complain(e.what());
             }
-        } catch (const std::exception& e) {
-            complaint = e.what();
         }
-    agree(team, complaint);
-
-    std::string said;
-    for (const auto& w : warnings) said += w + '\n';
-    for (const auto& bytes : team.gather(std::as_bytes(std::span(said.data(), said.size())))) {
-        std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-        for (std::size_t at = 0, end; (end = text.find('\n', at)) != std::string::npos; at = end + 1)
-            drawn.warnings.push_back(text.substr(at, end - at));
     }
-    return drawn;
+    /// What is to be drawn of a state's soil, read where it was not kept.
+    void take_soil(State& s) const
+    {
+        if (s.kept) return;
+        s.soil = read(s);
+        std::size_t to = 0;
+        for (std::size_t i = 0; i < s.soil.positions.size(); ++i)
+            if (in_slice(s.soil.positions[i])) s.soil.positions[to] = s.soil.positions[i], s.soil.values[to++] = s.soil.values[i];
+        s.soil.positions.resize(to), s.soil.values.resize(to);
+    }
+
+    /// Those of all ranks, on the root.
+    std::vector<std::string> all_warnings() const
+    {
+        std::vector<std::string> all;
+        std::string said;
+        for (const auto& w : warnings_) said += w + '\n';
+        for (const auto& bytes : team_.gather(std::as_bytes(std::span(said.data(), said.size())))) {
+            std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+            for (std::size_t at = 0, end; (end = text.find('\n', at)) != std::string::npos; at = end + 1)
+                all.push_back(text.substr(at, end - at));
+        }
+        return all;
+    }
+
+    const Team& team_;
+    const PictureTask& task_;
+    std::vector<State> states_;
+    bool flat_;
+    scene::View view_;
+    std::size_t first_ = 0; // good state
+    Place first_file_;
+    double middle_ = 0; // m, where the slice is cut
+    std::optional<SoilColor> color_;
+    int digits_ = 0;
+    std::size_t kept_ = 0;  // bytes
+    std::string complaint_; // the first of this rank
+    std::vector<std::string> warnings_;
+    std::mutex saying_;
+};
+
+} // namespace
+
+Drawn draw_pictures(const Team& team, const PictureTask& task)
+{
+    if (!can_draw()) Canvas(1, 1); // says why and what helps
+    return Series(team, task).draw();
 }
 
 } // namespace kuzure::io

@@ -156,29 +156,9 @@ inline KeyInfo name_info(const char* example)
     return {.optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall or body has it"};
 }
 
-template <class A> void describe_soil(A& a, const std::string& path, scene::Soil& soil)
+/// What changes a soil's strength as it yields.
+template <class A> void describe_laws(A& a, const std::string& path, scene::Soil& soil)
 {
-    a.number(path + ".density", soil.density,
-             {.unit = "kg/m^3", .range = above(0), .example = "1850.0", .doc = "bulk density at the start"});
-    a.number(path + ".young", soil.young, {.unit = "Pa", .range = above(0), .example = "1.8e6", .doc = "Young's modulus"});
-    a.number(path + ".poisson", soil.poisson, {.unit = "1", .range = from_below(0, 0.5), .example = "0.3", .doc = "Poisson's ratio"});
-    a.number(path + ".cohesion", soil.cohesion,
-             {.unit = "Pa", .range = from(0), .fallback = "0.0", .example = "5000.0", .doc = "cohesion c"});
-    a.angle(path + ".friction_angle", soil.friction_angle,
-            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "25.0", .doc = "friction angle phi"});
-    a.angle(path + ".dilation_angle", soil.dilation_angle,
-            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "0.0", .doc = "dilation angle psi, at most phi"});
-    a.choice(path + ".cone", soil.cone, cone_words(),
-             {.fallback = "\"compression\"",
-              .example = "\"compression\"",
-              .doc = "how the Drucker-Prager cone is fitted to c and phi (docs/theory.md)"});
-    a.choice(path + ".opened_volume", soil.opened_volume,
-             {{"kept", scene::OpenedVolume::Kept}, {"forgotten", scene::OpenedVolume::Forgotten}},
-             {.fallback = "\"kept\"",
-              .example = "\"kept\"",
-              .doc = "\"kept\": soil torn open bears no pressure until the opened volume is closed; \"forgotten\": at once, as published"});
-    a.number(path + ".tension_cutoff", soil.tension_cutoff,
-             {.unit = "Pa", .range = from(0), .example = "1000.0", .doc = "largest mean tension, at most the cone's apex c cot(phi)"});
     a.number(path + ".dilation_decay", soil.dilation_decay,
              {.unit = "1",
               .range = above(0),
@@ -218,6 +198,32 @@ template <class A> void describe_soil(A& a, const std::string& path, scene::Soil
                 a.number(p + ".grain_density", v.grain_density,
                          {.unit = "kg/m^3", .range = above(0), .fallback = "2600.0", .example = "2600.0", .doc = "density of a grain"});
             });
+}
+
+template <class A> void describe_soil(A& a, const std::string& path, scene::Soil& soil)
+{
+    a.number(path + ".density", soil.density,
+             {.unit = "kg/m^3", .range = above(0), .example = "1850.0", .doc = "bulk density at the start"});
+    a.number(path + ".young", soil.young, {.unit = "Pa", .range = above(0), .example = "1.8e6", .doc = "Young's modulus"});
+    a.number(path + ".poisson", soil.poisson, {.unit = "1", .range = from_below(0, 0.5), .example = "0.3", .doc = "Poisson's ratio"});
+    a.number(path + ".cohesion", soil.cohesion,
+             {.unit = "Pa", .range = from(0), .fallback = "0.0", .example = "5000.0", .doc = "cohesion c"});
+    a.angle(path + ".friction_angle", soil.friction_angle,
+            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "25.0", .doc = "friction angle phi"});
+    a.angle(path + ".dilation_angle", soil.dilation_angle,
+            {.unit = "deg", .range = from_below(0, 90), .fallback = "0.0", .example = "0.0", .doc = "dilation angle psi, at most phi"});
+    a.choice(path + ".cone", soil.cone, cone_words(),
+             {.fallback = "\"compression\"",
+              .example = "\"compression\"",
+              .doc = "how the Drucker-Prager cone is fitted to c and phi (docs/theory.md)"});
+    a.choice(path + ".opened_volume", soil.opened_volume,
+             {{"kept", scene::OpenedVolume::Kept}, {"forgotten", scene::OpenedVolume::Forgotten}},
+             {.fallback = "\"kept\"",
+              .example = "\"kept\"",
+              .doc = "\"kept\": soil torn open bears no pressure until the opened volume is closed; \"forgotten\": at once, as published"});
+    a.number(path + ".tension_cutoff", soil.tension_cutoff,
+             {.unit = "Pa", .range = from(0), .example = "1000.0", .doc = "largest mean tension, at most the cone's apex c cot(phi)"});
+    describe_laws(a, path, soil);
 }
 
 template <class A> void describe_effects(A& a, scene::Effects& effects)
@@ -555,13 +561,8 @@ template <class A> void describe_uncertain(A& a, std::optional<scene::Uncertain>
            });
 }
 
-/// Every key of a scene, in the order in which scenes are written.
-template <class A> void describe(A& a, Scene& s)
+template <class A> void describe_space_and_time(A& a, Scene& s)
 {
-    a.text("title", s.title, {.example = "\"self-weight collapse\"", .doc = "what this scene is", .role = Role::Bookkeeping});
-    a.integer("dimensions", s.dimensions,
-              {.range = between(2, 3), .example = "3", .doc = "3, or 2: plane strain in x-z with a full 3-D stress tensor"});
-
     a.section("space", {.example = "{ spacing = 0.04 }", .doc = "resolution and extent"});
     a.number("space.spacing", s.space.spacing,
              {.unit = "m", .range = between(1e-6, 1e6), .example = "0.04", .doc = "initial distance of particles"});
@@ -585,7 +586,11 @@ template <class A> void describe(A& a, Scene& s)
            {.fallback = "false",
             .example = "true",
             .doc = "when numbers fail: back to the last good state in memory and on with half the step, once for each trouble"});
+}
 
+/// Soils, bodies and walls.
+template <class A> void describe_matter(A& a, Scene& s)
+{
     a.soils("soil", s.soils, {.example = "[soil.sand]", .doc = "any number of soils, each with a name"},
             [&](const std::string& path, scene::Soil& soil) { describe_soil(a, path, soil); });
     a.tables("body", s.bodies, {.example = "[[body]]", .doc = "soil of one shape; bodies may touch, not overlap"},
@@ -619,8 +624,10 @@ template <class A> void describe(A& a, Scene& s)
                      });
                  a.text(path + ".name", wall.name, name_info("\"gate\""));
              });
+}
 
-    describe_terrain(a, s.terrain);
+template <class A> void describe_start(A& a, Scene& s)
+{
     a.section("start",
               {.fallback = "{}", .example = "{ from = \"results/settled\" }", .doc = "the state to start from", .role = Role::Bookkeeping});
     a.text("start.from", s.start.from,
@@ -630,6 +637,19 @@ template <class A> void describe(A& a, Scene& s)
                    "stresses and strains; time and displacement begin anew. Bodies, spacing and dimensions must be that run's; walls, "
                    "effects, soils' numbers and accuracy may differ",
             .role = Role::Bookkeeping});
+}
+
+/// Every key of a scene, in the order in which scenes are written.
+template <class A> void describe(A& a, Scene& s)
+{
+    a.text("title", s.title, {.example = "\"self-weight collapse\"", .doc = "what this scene is", .role = Role::Bookkeeping});
+    a.integer("dimensions", s.dimensions,
+              {.range = between(2, 3), .example = "3", .doc = "3, or 2: plane strain in x-z with a full 3-D stress tensor"});
+
+    describe_space_and_time(a, s);
+    describe_matter(a, s);
+    describe_terrain(a, s.terrain);
+    describe_start(a, s);
     describe_effects(a, s.effects);
     describe_accuracy(a, s.accuracy);
     describe_maps(a, s.maps);

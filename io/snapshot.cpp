@@ -84,6 +84,121 @@ std::uint64_t snapshot_bytes(std::int64_t points, const std::vector<std::string>
     return row * std::uint64_t(points) + 32768;
 }
 
+namespace {
+
+/// One snapshot as it is written: all ranks' rows, table by table.
+class Writer {
+public:
+    Writer(const Team& team, const Place& file, const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
+        : p_(p), walls_(walls), label_(label), n_(std::size_t(p.size())), mine_(n_ + walls.size()),
+          first_(team.sum_below(std::int64_t(mine_))), total_(team.sum(std::int64_t(mine_))), last_(team.rank() == team.size() - 1),
+          root_(team.rank() == 0), out_(team, file, snapshot_bytes(total_, label.fields)), rows_(p, walls, label.dimensions)
+    {
+    }
+    void write()
+    {
+        head(), cells(), marks();
+        for (const auto& c : columns)
+            if (wanted(label_.fields, c.name)) table(data + "/" + c.name, values(c.name), c.components, c.unit);
+        const std::string more = top + "/FieldData";
+        out_.group(more);
+        table(more + "/TimeValue", std::span<const double>(&label_.time, root_ ? 1 : 0), 1, "s");
+        table(more + "/step", std::span<const std::int64_t>(&label_.step, root_ ? 1 : 0), 1, "1");
+        out_.publish();
+    }
+
+private:
+    void table(const std::string& name, auto rows, int components, const char* unit)
+    {
+        out_.table(name, rows, components);
+        out_.attribute(name, "unit", unit);
+    }
+
+    void head()
+    {
+        out_.group(top);
+        const std::int64_t version[] = {1, 0};
+        out_.attribute(top, "Version", std::span<const std::int64_t>(version));
+        out_.attribute(top, "Type", "UnstructuredGrid");
+        out_.attribute(top, "time", label_.time);
+        out_.attribute(top, "step", label_.step);
+        out_.attribute(top, "time_unit", "s");
+        out_.attribute(top, "title", label_.title);
+        if (label_.failed) out_.attribute(top, "failed_particle", *label_.failed);
+    }
+
+    /// One partition: its sizes, the vertices as cells.
+    void cells()
+    {
+        for (const char* count : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
+            table(top + "/" + count, std::span<const std::int64_t>(&total_, root_ ? 1 : 0), 1, "1");
+        std::vector<std::int64_t> whole(mine_ + 1);
+        for (std::size_t i = 0; i <= mine_; ++i) whole[i] = first_ + std::int64_t(i);
+        const std::span<const std::int64_t> numbers(whole);
+        table(top + "/Connectivity", numbers.first(mine_), 1, "1");
+        table(top + "/Offsets", numbers.first(mine_ + (last_ ? 1 : 0)), 1, "1");
+        const std::vector<std::uint8_t> types(mine_, vtk_vertex);
+        table(top + "/Types", std::span<const std::uint8_t>(types), 1, "1");
+        table(top + "/Points",
+              rows_.of(
+                  3, [x = p_[field::position]](Index i) { return x[i]; }, [&](std::size_t i) { return walls_.position[i]; }),
+              3, "m");
+    }
+
+    /// Whole numbers of the points.
+    void marks()
+    {
+        out_.group(data);
+        const auto id = p_[field::id];
+        std::vector<std::int64_t> whole(mine_);
+        for (std::size_t i = 0; i < mine_; ++i) whole[i] = i < n_ ? id[Index(i)] : walls_.id[i - n_];
+        table(data + "/id", std::span<const std::int64_t>(whole), 1, "1");
+        std::vector<std::int32_t> small(mine_);
+        for (std::size_t i = 0; i < mine_; ++i) small[i] = i < n_ ? 0 : 1;
+        table(data + "/kind", std::span<const std::int32_t>(small), 1, "1");
+        // Without the column there is one soil only.
+        const bool soils = p_.has(field::soil);
+        for (std::size_t i = 0; i < mine_; ++i) small[i] = i >= n_ ? -1 : soils ? p_[field::soil][Index(i)] : 0;
+        table(data + "/soil", std::span<const std::int32_t>(small), 1, "1");
+    }
+
+    std::span<const double> values(std::string_view name)
+    {
+        const auto none = [](std::size_t) { return 0.0; };
+        const auto no_vector = [](std::size_t) { return Vector{}; };
+        if (name == "velocity")
+            return rows_.of(
+                3, [v = p_[field::velocity]](Index i) { return v[i]; }, no_vector);
+        if (name == "stress")
+            return rows_.of(
+                6, [s = p_[field::stress]](Index i) { return s[i]; }, [](std::size_t) { return Stress{}; });
+        if (name == "density")
+            return rows_.of(
+                1, [r = p_[field::density]](Index i) { return r[i]; }, [&](std::size_t i) { return walls_.density[i]; });
+        if (name == "plastic_strain") {
+            if (!p_.has(field::plastic_strain))
+                return rows_.of(
+                    1, [](Index) { return 0.0; }, none);
+            return rows_.of(
+                1, [e = p_[field::plastic_strain]](Index i) { return e[i]; }, none);
+        }
+        return rows_.of(
+            3, [x = p_[field::position], o = p_[field::origin]](Index i) { return x[i] - o[i]; }, no_vector);
+    }
+
+    static inline const std::string top = "/VTKHDF", data = top + "/PointData";
+    const Particles& p_;
+    const WallPoints& walls_;
+    const SnapshotLabel& label_;
+    std::size_t n_, mine_; // soil, and all points, of this rank
+    std::int64_t first_, total_;
+    bool last_, root_;
+    H5Writer out_;
+    Rows rows_;
+};
+
+} // namespace
+
 void write_snapshot(const Team& team, const Place& file, const Particles& p, const WallPoints& walls, const SnapshotLabel& label)
 {
     for (const auto& f : label.fields) {
@@ -92,89 +207,7 @@ void write_snapshot(const Team& team, const Place& file, const Particles& p, con
             throw BadInput(fmt::format("[output] fields: '{}' is not a field: expected some of {}", f, fmt::join(known, ", ")));
     }
     ensure(walls.id.size() == walls.size() && walls.density.size() == walls.size(), "wall points without id or density");
-
-    const auto n = std::size_t(p.size()), mine = n + walls.size();
-    const std::int64_t first = team.sum_below(std::int64_t(mine)), total = team.sum(std::int64_t(mine));
-    const bool last = team.rank() == team.size() - 1;
-    const bool root = team.rank() == 0;
-
-    H5Writer out(team, file, snapshot_bytes(total, label.fields));
-    const std::string top = "/VTKHDF";
-    out.group(top);
-    const std::int64_t version[] = {1, 0};
-    out.attribute(top, "Version", std::span<const std::int64_t>(version));
-    out.attribute(top, "Type", "UnstructuredGrid");
-    out.attribute(top, "time", label.time);
-    out.attribute(top, "step", label.step);
-    out.attribute(top, "time_unit", "s");
-    out.attribute(top, "title", label.title);
-    if (label.failed) out.attribute(top, "failed_particle", *label.failed);
-
-    const auto table = [&](const std::string& name, auto rows, int components, const char* unit) {
-        out.table(name, rows, components);
-        out.attribute(name, "unit", unit);
-    };
-    // One partition: its sizes, the vertices as cells.
-    for (const char* count : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
-        table(top + "/" + count, std::span<const std::int64_t>(&total, root ? 1 : 0), 1, "1");
-    std::vector<std::int64_t> whole(mine + 1);
-    for (std::size_t i = 0; i <= mine; ++i) whole[i] = first + std::int64_t(i);
-    const std::span<const std::int64_t> numbers(whole);
-    table(top + "/Connectivity", numbers.first(mine), 1, "1");
-    table(top + "/Offsets", numbers.first(mine + (last ? 1 : 0)), 1, "1");
-    const std::vector<std::uint8_t> types(mine, vtk_vertex);
-    table(top + "/Types", std::span<const std::uint8_t>(types), 1, "1");
-
-    Rows rows(p, walls, label.dimensions);
-    const auto none = [](std::size_t) { return 0.0; };
-    const auto no_vector = [](std::size_t) { return Vector{}; };
-    const auto x = p[field::position];
-    table(top + "/Points",
-          rows.of(
-              3, [&](Index i) { return x[i]; }, [&](std::size_t i) { return walls.position[i]; }),
-          3, "m");
-
-    const std::string data = top + "/PointData";
-    out.group(data);
-    const auto id = p[field::id];
-    for (std::size_t i = 0; i < mine; ++i) whole[i] = i < n ? id[Index(i)] : walls.id[i - n];
-    table(data + "/id", numbers.first(mine), 1, "1");
-    std::vector<std::int32_t> small(mine);
-    for (std::size_t i = 0; i < mine; ++i) small[i] = i < n ? 0 : 1;
-    table(data + "/kind", std::span<const std::int32_t>(small), 1, "1");
-    // Without the column there is one soil only.
-    const bool soils = p.has(field::soil);
-    for (std::size_t i = 0; i < mine; ++i) small[i] = i >= n ? -1 : soils ? p[field::soil][Index(i)] : 0;
-    table(data + "/soil", std::span<const std::int32_t>(small), 1, "1");
-
-    const auto values = [&](std::string_view name) -> std::span<const double> {
-        if (name == "velocity")
-            return rows.of(
-                3, [v = p[field::velocity]](Index i) { return v[i]; }, no_vector);
-        if (name == "stress")
-            return rows.of(
-                6, [s = p[field::stress]](Index i) { return s[i]; }, [](std::size_t) { return Stress{}; });
-        if (name == "density")
-            return rows.of(
-                1, [r = p[field::density]](Index i) { return r[i]; }, [&](std::size_t i) { return walls.density[i]; });
-        if (name == "plastic_strain") {
-            if (!p.has(field::plastic_strain))
-                return rows.of(
-                    1, [](Index) { return 0.0; }, none);
-            return rows.of(
-                1, [e = p[field::plastic_strain]](Index i) { return e[i]; }, none);
-        }
-        return rows.of(
-            3, [x, o = p[field::origin]](Index i) { return x[i] - o[i]; }, no_vector);
-    };
-    for (const auto& c : columns)
-        if (wanted(label.fields, c.name)) table(data + "/" + c.name, values(c.name), c.components, c.unit);
-
-    const std::string more = top + "/FieldData";
-    out.group(more);
-    table(more + "/TimeValue", std::span<const double>(&label.time, root ? 1 : 0), 1, "s");
-    table(more + "/step", std::span<const std::int64_t>(&label.step, root ? 1 : 0), 1, "1");
-    out.publish();
+    Writer(team, file, p, walls, label).write();
 }
 
 SoilSnapshot read_snapshot(const Place& file)

@@ -58,6 +58,74 @@ std::string trimmed(std::string_view s)
     return from == s.npos ? "" : std::string(s.substr(from, to + 1 - from));
 }
 
+std::string crs_of(const pugi::xml_node& coverage, const std::string& file)
+{
+    const std::string system = find(coverage, "Envelope").attribute("srsName").value();
+    if (system.find("jgd2011") != system.npos || system.find("jgd2024") != system.npos) return crs_from("EPSG:6668", file);
+    if (system.find("jgd2000") != system.npos) return crs_from("EPSG:4612", file);
+    throw BadInput(fmt::format("{}: expected latitude and longitude in fguuid:jgd2011.bl or jgd2000.bl, found \"{}\". Remedy: download the "
+                               "elevation model anew (fgd.gsi.go.jp)",
+                               file, system));
+}
+
+/// The cells of a mesh, without heights.
+scene::Grid grid_of(const pugi::xml_node& coverage, const std::string& file)
+{
+    // Latitude first.
+    const auto low = two(coverage, "lowerCorner", file), high = two(coverage, "upperCorner", file);
+    const auto first = two(coverage, "low", file), last = two(coverage, "high", file);
+    const double columns = last[0] - first[0] + 1, rows = last[1] - first[1] + 1;
+    if (!(columns >= 1 && rows >= 1 && columns * rows < 1e8) || columns != std::floor(columns) || rows != std::floor(rows))
+        throw BadInput(fmt::format("{}: expected whole numbers of columns and rows, found {} x {}", file, columns, rows));
+    const double dx = (high[1] - low[1]) / columns, dy = (high[0] - low[0]) / rows;
+    if (!(dx > 0 && dy > 0) || std::abs(dx - dy) * std::max(columns, rows) > 0.1 * dx)
+        throw BadInput(
+            fmt::format("{}: its cells of {} x {} degrees are not square. Remedy: download it again, the corners ({} {}, {} {}) are not "
+                        "those of {} x {} cells",
+                        file, dx, dy, low[0], low[1], high[0], high[1], columns, rows));
+    scene::Grid grid = placed(low[1], low[0], rounded_cell(dx, true), std::int64_t(columns), std::int64_t(rows), file);
+    grid.values.assign(std::size_t(columns * rows), std::numeric_limits<double>::quiet_NaN());
+    return grid;
+}
+
+/// The cell of the first value, counted from the north-west row by row.
+std::size_t first_cell(const pugi::xml_node& coverage, const scene::Grid& grid, const std::string& file)
+{
+    const int columns = grid.columns, rows = grid.rows;
+    const auto rule = find(coverage, "sequenceRule");
+    const std::string order = rule.attribute("order").value();
+    if (order != "+x-y")
+        throw BadInput(fmt::format(
+            "{}: expected values in the order \"+x-y\", from the north-west row by row, found \"{}\". Remedy: download it again", file,
+            order));
+    const auto start = two(coverage, "startPoint", file);
+    if (!(start[0] >= 0 && start[1] >= 0 && start[0] < columns && start[1] < rows) || start[0] != std::floor(start[0]) ||
+        start[1] != std::floor(start[1]))
+        throw BadInput(fmt::format("{}: its startPoint {} {} lies outside its {} x {} cells. Remedy: download it again", file, start[0],
+                                   start[1], columns, rows));
+    return std::size_t(start[1]) * std::size_t(columns) + std::size_t(start[0]);
+}
+
+/// The height of a line "type,height", where it has one.
+std::optional<double> height_of(const std::string& line, const std::string& where)
+{
+    const auto comma = line.find(',');
+    if (comma == line.npos) throw BadInput(where + ": expected a type, a comma and a height. Remedy: download it again");
+    const std::string type = trimmed(line.substr(0, comma)), number = trimmed(line.substr(comma + 1));
+    double x = 0;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), x);
+    if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(x))
+        throw BadInput(where + ": expected a height after the comma. Remedy: download it again");
+    bool known = false;
+    for (const char* word : {"地表面", "表層面", "海水面", "内水面", "その他", "データなし", "海水底面", "内水底面"})
+        known = known || type == word;
+    if (!known)
+        throw BadInput(fmt::format(
+            "{}: expected 地表面, 表層面, 海水面, 内水面, その他 or データなし, found \"{}\". Remedy: download it again", where, type));
+    if (type == "データなし" || !(x > -9998)) return {};
+    return single(x);
+}
+
 /// One mesh; nothing where the file is no elevation model.
 std::optional<Mesh> mesh_of(const std::string& bytes, const std::string& file)
 {
@@ -71,44 +139,11 @@ std::optional<Mesh> mesh_of(const std::string& bytes, const std::string& file)
     const auto list = find(coverage, "tupleList");
     if (!coverage || !list) return {};
 
-    const std::string system = find(coverage, "Envelope").attribute("srsName").value();
     Mesh m;
-    if (system.find("jgd2011") != system.npos || system.find("jgd2024") != system.npos) m.crs = crs_from("EPSG:6668", file);
-    else if (system.find("jgd2000") != system.npos) m.crs = crs_from("EPSG:4612", file);
-    else
-        throw BadInput(
-            fmt::format("{}: expected latitude and longitude in fguuid:jgd2011.bl or jgd2000.bl, found \"{}\". Remedy: download the "
-                        "elevation model anew (fgd.gsi.go.jp)",
-                        file, system));
-    // Latitude first.
-    const auto low = two(coverage, "lowerCorner", file), high = two(coverage, "upperCorner", file);
-    const auto first = two(coverage, "low", file), last = two(coverage, "high", file);
-    const double columns = last[0] - first[0] + 1, rows = last[1] - first[1] + 1;
-    if (!(columns >= 1 && rows >= 1 && columns * rows < 1e8) || columns != std::floor(columns) || rows != std::floor(rows))
-        throw BadInput(fmt::format("{}: expected whole numbers of columns and rows, found {} x {}", file, columns, rows));
-    const double dx = (high[1] - low[1]) / columns, dy = (high[0] - low[0]) / rows;
-    if (!(dx > 0 && dy > 0) || std::abs(dx - dy) * std::max(columns, rows) > 0.1 * dx)
-        throw BadInput(
-            fmt::format("{}: its cells of {} x {} degrees are not square. Remedy: download it again, the corners ({} {}, {} {}) are not "
-                        "those of {} x {} cells",
-                        file, dx, dy, low[0], low[1], high[0], high[1], columns, rows));
-    m.grid = placed(low[1], low[0], rounded_cell(dx, true), std::int64_t(columns), std::int64_t(rows), file);
-    m.grid.values.assign(std::size_t(columns * rows), std::numeric_limits<double>::quiet_NaN());
-
-    const auto rule = find(coverage, "sequenceRule");
-    const std::string order = rule.attribute("order").value();
-    if (order != "+x-y")
-        throw BadInput(fmt::format(
-            "{}: expected values in the order \"+x-y\", from the north-west row by row, found \"{}\". Remedy: download it again", file,
-            order));
-    const auto start = two(coverage, "startPoint", file);
-    if (!(start[0] >= 0 && start[1] >= 0 && start[0] < columns && start[1] < rows) || start[0] != std::floor(start[0]) ||
-        start[1] != std::floor(start[1]))
-        throw BadInput(fmt::format("{}: its startPoint {} {} lies outside its {} x {} cells. Remedy: download it again", file, start[0],
-                                   start[1], columns, rows));
-
-    const std::size_t cells = m.grid.values.size();
-    std::size_t at = std::size_t(start[1]) * std::size_t(columns) + std::size_t(start[0]);
+    m.crs = crs_of(coverage, file);
+    m.grid = grid_of(coverage, file);
+    const auto columns = std::size_t(m.grid.columns), cells = m.grid.values.size(), first = first_cell(coverage, m.grid, file);
+    std::size_t at = first;
     const std::string_view all = list.child_value();
     for (std::size_t from = 0, given = 0; from < all.size();) {
         const auto to = std::min(all.find('\n', from), all.size());
@@ -116,30 +151,13 @@ std::optional<Mesh> mesh_of(const std::string& bytes, const std::string& file)
         from = to + 1;
         if (line.empty()) continue;
         ++given;
-        const auto where = [&] { return fmt::format("{}: value {} (\"{}\")", file, given, line.substr(0, 60)); };
+        const std::string where = fmt::format("{}: value {} (\"{}\")", file, given, line.substr(0, 60));
         if (at >= cells)
             throw BadInput(fmt::format(
                 "{}: its list is longer than its grid: {} x {} cells from startPoint {} {} are full. Remedy: download it again, or "
                 "convert it with another tool and look at it",
-                where(), columns, rows, start[0], start[1]));
-        const auto comma = line.find(',');
-        if (comma == line.npos) throw BadInput(where() + ": expected a type, a comma and a height. Remedy: download it again");
-        const std::string type = trimmed(line.substr(0, comma)), number = trimmed(line.substr(comma + 1));
-        double x = 0;
-        const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), x);
-        if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(x))
-            throw BadInput(where() + ": expected a height after the comma. Remedy: download it again");
-        bool known = false;
-        for (const char* word : {"地表面", "表層面", "海水面", "内水面", "その他", "データなし", "海水底面", "内水底面"})
-            known = known || type == word;
-        if (!known)
-            throw BadInput(
-                fmt::format("{}: expected 地表面, 表層面, 海水面, 内水面, その他 or データなし, found \"{}\". Remedy: download it again",
-                            where(), type));
-        if (type != "データなし" && x > -9998) {
-            const int row = int(at / std::size_t(columns)), column = int(at % std::size_t(columns));
-            m.grid.at(column, m.grid.rows - 1 - row) = single(x);
-        }
+                where, columns, m.grid.rows, first % columns, first / columns));
+        if (const auto height = height_of(line, where)) m.grid.at(int(at % columns), m.grid.rows - 1 - int(at / columns)) = *height;
         ++at;
     }
     return m;

@@ -19,92 +19,133 @@ public:
     }
     void work(Mass& m)
     {
-        scene::Release& r = *m.release;
-        const std::size_t n = dem_.values.size();
-        const auto& z = dem_.values;
-        m.bed.assign(n, none);
-        const auto read = [&](const std::string& which, const std::string& file) {
-            return at_key(m.key + which, [&] { return onto(file, dem_, crs_); });
-        };
-        // The outline must lie on ground, with a cell around it for the slopes.
-        if (!m.rings.empty()) {
-            const Window w = extent_of(dem_);
-            const double rim = 2 * dem_.cell;
-            for (const auto& ring : m.rings)
-                for (const auto& p : ring)
-                    if (p[0] < w.low_x + rim || p[0] > w.high_x - rim || p[1] < w.low_y + rim || p[1] > w.high_y - rim)
-                        throw Refused{m.key + ".outline",
-                                      fmt::format("{}: its corner ({:.10g}, {:.10g}) lies outside the ground, or within two cells of its "
-                                                  "edge ({}). Remedy: a larger window or elevation model, or another outline",
-                                                  r.outline, p[0], p[1], shown(w))};
-        }
-        const auto refuse_gap = [&](const std::string& which, const std::string& file, int i, int j) {
-            throw Refused{m.key + which, fmt::format("{}: no data at {} under the release. Remedy: fill the hole (gdal_fillnodata.py, or "
-                                                     "another file behind it in terrain.dem), or another outline",
-                                                     file, cell_text(dem_, i, j))};
-        };
-        const auto dem_file = dem_files(scene_);
-        std::vector<double> t(n, none); // m, NaN: not known
-        if (r.thickness) {
-            std::fill(t.begin(), t.end(), *r.thickness);
-        } else if (!r.thickness_map.empty()) {
-            t = read(".thickness_map", r.thickness_map);
-            dem_.for_each([&](int i, int j, std::size_t k) {
-                if (t[k] < 0)
-                    throw Refused{m.key + ".thickness_map", fmt::format("{}: expected thicknesses from 0, found {} m at {}. Remedy: "
-                                                                        "gdal_calc.py, or declare it no data: gdal_translate -a_nodata {}",
-                                                                        r.thickness_map, t[k], cell_text(dem_, i, j), t[k])};
-            });
-        } else if (!r.surface.empty()) {
-            const auto slip = read(".surface", r.surface);
-            dem_.for_each([&](int i, int j, std::size_t k) {
-                if (m.rings.empty() ? std::isnan(slip[k]) : !in(m, i, j)) {
-                    if (!std::isnan(slip[k]) && !std::isnan(z[k])) t[k] = std::max(0.0, z[k] - slip[k]);
-                    return;
-                }
-                if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
-                if (std::isnan(slip[k])) refuse_gap(".surface", r.surface, i, j);
-                if (!m.rings.empty() && slip[k] > z[k] + 0.5)
-                    throw Refused{m.key + ".surface",
-                                  fmt::format("{}: the slip surface lies {:.2f} m above the ground at {}, inside the outline: a thickness "
-                                              "below 0. Remedy: check the heights of both, or the outline",
-                                              r.surface, slip[k] - z[k], cell_text(dem_, i, j))};
-                t[k] = std::max(0.0, z[k] - slip[k]);
-                if (t[k] > 0) m.bed[k] = slip[k];
-            });
-        } else if (!r.before.empty()) {
-            const auto before = read(".before", r.before), after = read(".after", r.after);
-            double square = 0;
-            std::size_t outside = 0;
-            dem_.for_each([&](int i, int j, std::size_t k) {
-                const bool here = !m.rings.empty() && in(m, i, j);
-                if (here && std::isnan(before[k])) refuse_gap(".before", r.before, i, j);
-                if (here && std::isnan(after[k])) refuse_gap(".after", r.after, i, j);
-                if (std::isnan(before[k]) || std::isnan(after[k])) return;
-                const double d = before[k] - after[k];
-                if (!here && !m.rings.empty()) square += d * d, ++outside;
-                t[k] = std::max(0.0, d);
-                if (here || (m.rings.empty() && d > 0)) m.bed[k] = after[k];
-            });
-            if (outside > 0 && std::sqrt(square / double(outside)) > 0.5)
-                warn(m.key, fmt::format("before and after differ by {:.2f} m (root mean square) outside the outline too: one is shifted, "
-                                        "or has trees, or the deposit is in the window",
-                                        std::sqrt(square / double(outside))));
-        } else {
-            dem_.for_each([&](int i, int j, std::size_t k) {
-                for (const auto& o : m.outlines)
-                    if (std::isnan(t[k]) && scene::encloses(o.rings, dem_.x_of(i), dem_.y_of(j))) t[k] = *o.thickness;
-            });
-        }
+        m.bed.assign(dem_.values.size(), none);
+        check_outline(m);
+        std::vector<double> t = thickness_of(m); // m, NaN: not known
+        lay_bed(m, t);
+        if (!m.release->thickness) end_at_outline(m, t);
+        m.thickness = std::move(t);
+        check_reach(m);
+    }
 
-        // Inside, ground must be known; the bed follows.
+private:
+    std::vector<double> read(const Mass& m, const std::string& which, const std::string& file) const
+    {
+        return at_key(m.key + which, [&] { return onto(file, dem_, crs_); });
+    }
+    [[noreturn]] void refuse_gap(const Mass& m, const std::string& which, const std::string& file, int i, int j) const
+    {
+        throw Refused{m.key + which, fmt::format("{}: no data at {} under the release. Remedy: fill the hole (gdal_fillnodata.py, or "
+                                                 "another file behind it in terrain.dem), or another outline",
+                                                 file, cell_text(dem_, i, j))};
+    }
+
+    /// The outline must lie on ground, with a cell around it for the slopes.
+    void check_outline(const Mass& m) const
+    {
+        if (m.rings.empty()) return;
+        const scene::Release& r = *m.release;
+        const Window w = extent_of(dem_);
+        const double rim = 2 * dem_.cell;
+        for (const auto& ring : m.rings)
+            for (const auto& p : ring)
+                if (p[0] < w.low_x + rim || p[0] > w.high_x - rim || p[1] < w.low_y + rim || p[1] > w.high_y - rim)
+                    throw Refused{m.key + ".outline",
+                                  fmt::format("{}: its corner ({:.10g}, {:.10g}) lies outside the ground, or within two cells of its "
+                                              "edge ({}). Remedy: a larger window or elevation model, or another outline",
+                                              r.outline, p[0], p[1], shown(w))};
+    }
+
+    std::vector<double> thickness_of(Mass& m)
+    {
+        const scene::Release& r = *m.release;
+        if (r.thickness) return std::vector<double>(dem_.values.size(), *r.thickness);
+        if (!r.thickness_map.empty()) return thickness_of_map(m);
+        if (!r.surface.empty()) return thickness_above_surface(m);
+        if (!r.before.empty()) return thickness_of_difference(m);
+        std::vector<double> t(dem_.values.size(), none);
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            for (const auto& o : m.outlines)
+                if (std::isnan(t[k]) && scene::encloses(o.rings, dem_.x_of(i), dem_.y_of(j))) t[k] = *o.thickness;
+        });
+        return t;
+    }
+
+    std::vector<double> thickness_of_map(const Mass& m) const
+    {
+        const scene::Release& r = *m.release;
+        const auto t = read(m, ".thickness_map", r.thickness_map);
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            if (t[k] < 0)
+                throw Refused{m.key + ".thickness_map", fmt::format("{}: expected thicknesses from 0, found {} m at {}. Remedy: "
+                                                                    "gdal_calc.py, or declare it no data: gdal_translate -a_nodata {}",
+                                                                    r.thickness_map, t[k], cell_text(dem_, i, j), t[k])};
+        });
+        return t;
+    }
+
+    /// The ground above a slip surface, which is the bed.
+    std::vector<double> thickness_above_surface(Mass& m) const
+    {
+        const scene::Release& r = *m.release;
+        const auto& z = dem_.values;
+        std::vector<double> t(z.size(), none);
+        const auto slip = read(m, ".surface", r.surface);
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            if (m.rings.empty() ? std::isnan(slip[k]) : !in(m, i, j)) {
+                if (!std::isnan(slip[k]) && !std::isnan(z[k])) t[k] = std::max(0.0, z[k] - slip[k]);
+                return;
+            }
+            if (std::isnan(z[k])) refuse_gap(m, "", dem_files(scene_), i, j);
+            if (std::isnan(slip[k])) refuse_gap(m, ".surface", r.surface, i, j);
+            if (!m.rings.empty() && slip[k] > z[k] + 0.5)
+                throw Refused{m.key + ".surface",
+                              fmt::format("{}: the slip surface lies {:.2f} m above the ground at {}, inside the outline: a thickness "
+                                          "below 0. Remedy: check the heights of both, or the outline",
+                                          r.surface, slip[k] - z[k], cell_text(dem_, i, j))};
+            t[k] = std::max(0.0, z[k] - slip[k]);
+            if (t[k] > 0) m.bed[k] = slip[k];
+        });
+        return t;
+    }
+
+    /// The ground before over that after, which is the bed.
+    std::vector<double> thickness_of_difference(Mass& m)
+    {
+        const scene::Release& r = *m.release;
+        std::vector<double> t(dem_.values.size(), none);
+        const auto before = read(m, ".before", r.before), after = read(m, ".after", r.after);
+        double square = 0;
+        std::size_t outside = 0;
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            const bool here = !m.rings.empty() && in(m, i, j);
+            if (here && std::isnan(before[k])) refuse_gap(m, ".before", r.before, i, j);
+            if (here && std::isnan(after[k])) refuse_gap(m, ".after", r.after, i, j);
+            if (std::isnan(before[k]) || std::isnan(after[k])) return;
+            const double d = before[k] - after[k];
+            if (!here && !m.rings.empty()) square += d * d, ++outside;
+            t[k] = std::max(0.0, d);
+            if (here || (m.rings.empty() && d > 0)) m.bed[k] = after[k];
+        });
+        if (outside > 0 && std::sqrt(square / double(outside)) > 0.5)
+            warn(m.key, fmt::format("before and after differ by {:.2f} m (root mean square) outside the outline too: one is shifted, "
+                                    "or has trees, or the deposit is in the window",
+                                    std::sqrt(square / double(outside))));
+        return t;
+    }
+
+    /// Inside, ground must be known; the bed follows.
+    void lay_bed(Mass& m, const std::vector<double>& t)
+    {
+        const scene::Release& r = *m.release;
+        const auto& z = dem_.values;
         double sum = 0, thickest = 0;
         std::size_t cells = 0;
         dem_.for_each([&](int i, int j, std::size_t k) {
             const bool here = m.rings.empty() ? t[k] > 0 : in(m, i, j);
             if (!here) return;
-            if (std::isnan(z[k])) refuse_gap("", dem_file, i, j);
-            if (std::isnan(t[k]) && !r.thickness_map.empty()) refuse_gap(".thickness_map", r.thickness_map, i, j);
+            if (std::isnan(z[k])) refuse_gap(m, "", dem_files(scene_), i, j);
+            if (std::isnan(t[k]) && !r.thickness_map.empty()) refuse_gap(m, ".thickness_map", r.thickness_map, i, j);
             if (std::isnan(t[k]) || !(t[k] > 0)) return;
             sum += t[k], ++cells, thickest = std::max(thickest, t[k]);
             if (std::isnan(m.bed[k])) m.bed[k] = r.on_top ? z[k] : z[k] - t[k];
@@ -115,6 +156,12 @@ public:
                        : !r.surface.empty() ? "the slip surface is nowhere below the ground: no mass. Remedy: check the heights of both"
                                             : "no cell of the elevation model lies inside: no mass. Remedy: an elevation model with "
                                               "smaller cells, or a larger outline"};
+        judge_size(m, sum, cells, thickest);
+    }
+
+    /// `sum` of the thicknesses (m) of so many cells.
+    void judge_size(const Mass& m, double sum, std::size_t cells, double thickest)
+    {
         const double a = double(cells) * dem_.cell * dem_.cell, volume = sum * dem_.cell * dem_.cell, mean = volume / a;
         if (const double share = volume / std::pow(a, 1.5); share < 0.03 || share > 0.5)
             warn(m.key, fmt::format("a volume of {:.3g} m^3 on {:.3g} m^2 (mean thickness {:.2f} m) is {:.1f} % of area^1.5, where slides "
@@ -128,23 +175,22 @@ public:
                  fmt::format(
                      "the release is {:.1f} layers of particles thick on average; below 6 its reach is rough. Remedy: spacing = {:.2g}",
                      mean / scene_.space.spacing, mean / 6));
-        if (!r.thickness) {
-            if (m.rings.empty()) {
-                for (double& x : t)
-                    if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
-            } else {
-                // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
-                dem_.for_each([&](int i, int j, std::size_t k) {
-                    if (t[k] == 0 && !in(m, i, j)) t[k] = none;
-                });
-                extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
-            }
-        }
-        m.thickness = std::move(t);
-        check_reach(m);
     }
 
-private:
+    void end_at_outline(const Mass& m, std::vector<double>& t) const
+    {
+        if (m.rings.empty()) {
+            for (double& x : t)
+                if (std::isnan(x)) x = 0; // a cell's thickness counts for its area
+        } else {
+            // Soil stands within the outline, as thick as there: a raster that ends with it would taper off half a cell before.
+            dem_.for_each([&](int i, int j, std::size_t k) {
+                if (t[k] == 0 && !in(m, i, j)) t[k] = none;
+            });
+            extend(t, 1 + std::max(1, int(scene_.space.spacing / dem_.cell)));
+        }
+    }
+
     void warn(const std::string& key, const std::string& text) { issues_.push_back({scene::Severity::Warning, key, text, ""}); }
 
     bool in(const Mass& m, int i, int j) const { return m.rings.empty() || scene::encloses(m.rings, dem_.x_of(i), dem_.y_of(j)); }

@@ -15,8 +15,7 @@ struct Relief {
     double steepest = 0, steepest_x = 0, steepest_y = 0; // deg, and where on the map
     std::size_t with_slope() const;
 };
-/// Slopes by central differences where all four neighbours have heights. Cells are `dx` by `dy` metres, which differ where the grid is in
-/// degrees.
+/// Slopes by central differences where all four neighbours have heights. Cells are `dx` by `dy` metres: of a grid in degrees two lengths.
 Relief relief(const scene::Grid&, double dx, double dy);
 /// Metres of a cell along x and y, in the middle of a raster.
 std::array<double, 2> metres_of_cell(const scene::Grid&, const std::string& crs);

@@ -1,18 +1,12 @@
-// GeoTIFF by libtiff and libgeotiff.
+// Elevation models as GeoTIFF.
 #include "io/ground/formats.hpp"
 #if KUZURE_TERRAIN
 #include "io/ground/crs.hpp"
+#include "io/ground/tiff_library.hpp"
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <cstring>
 #include <fmt/format.h>
-#include <geo_normalize.h>
-#include <geotiffio.h>
-#include <memory>
-#include <mutex>
-#include <tiffio.h>
-#include <xtiffio.h>
 #endif
 
 namespace kuzure::io {
@@ -21,56 +15,16 @@ namespace kuzure::io {
 namespace ground {
 namespace {
 
-constexpr std::uint32_t gdal_metadata = 42112, gdal_nodata = 42113;
-constexpr int first_epsg = 1024, last_epsg = 32766;
-
-thread_local std::string last_words; // of libtiff
-
-void keep_words(const char*, const char* format, std::va_list arguments)
-{
-    char text[400];
-    std::vsnprintf(text, sizeof text, format, arguments);
-    last_words = text;
-}
-
-/// libtiff as kuzure uses it: its errors are kept for our messages, and it knows GDAL's tags.
-void set_up_libtiff()
-{
-    static std::once_flag once;
-    std::call_once(once, [] {
-        TIFFSetErrorHandler(keep_words);
-        TIFFSetWarningHandler(nullptr);
-        XTIFFInitialize();
-        static TIFFExtendProc parent;
-        parent = TIFFSetTagExtender([](TIFF* tiff) {
-            static const TIFFFieldInfo fields[] = {
-                {gdal_metadata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, const_cast<char*>("GDALMetadata")},
-                {gdal_nodata, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, const_cast<char*>("GDALNoDataValue")}};
-            TIFFMergeFieldInfo(tiff, fields, 2);
-            if (parent) parent(tiff);
-        });
-    });
-}
-
-struct Close {
-    void operator()(TIFF* t) const { XTIFFClose(t); }
-};
-struct Free {
-    void operator()(GTIF* g) const { GTIFFree(g); }
-};
-using Tiff = std::unique_ptr<TIFF, Close>;
-using GeoKeys = std::unique_ptr<GTIF, Free>;
-
 std::string remedy() { return "Remedy: gdalwarp -t_srs EPSG:6670 -tr 2 2 -r bilinear in.tif out.tif, with your system and cell"; }
 
 Tiff open(const Path& path)
 {
     set_up_libtiff();
-    last_words.clear();
+    last_words().clear();
     Tiff t(XTIFFOpen(path.c_str(), "rm")); // not mapped: a window of a huge file takes its own memory only
     if (!t)
         throw BadInput(fmt::format("{}: cannot be read as a TIFF: {}. Remedy: copy it again, or make it anew with gdal_translate",
-                                   path.string(), last_words));
+                                   path.string(), last_words()));
     return t;
 }
 
@@ -121,13 +75,9 @@ struct Layout {
     std::uint16_t bits = 0, format = 0;
 };
 
-Layout layout(TIFF* tiff, const Path& path)
+/// The kind of its numbers; refuses what is no single number a cell, or cannot be decoded.
+void read_format(TIFF* tiff, const std::string& file, Layout& l)
 {
-    const std::string file = path.string();
-    Layout l;
-    std::uint32_t columns = 0, rows = 0;
-    TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &columns);
-    TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &rows);
     std::uint16_t bands = 1, orientation = ORIENTATION_TOPLEFT, compression = COMPRESSION_NONE;
     TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLESPERPIXEL, &bands);
     TIFFGetFieldDefaulted(tiff, TIFFTAG_BITSPERSAMPLE, &l.bits);
@@ -150,11 +100,18 @@ Layout layout(TIFF* tiff, const Path& path)
                                    file, l.format, l.bits));
     if (orientation != ORIENTATION_TOPLEFT)
         throw BadInput(fmt::format("{}: its rows do not run from north to south (orientation {}). {}", file, orientation, remedy()));
+}
 
-    // Where the cells are.
+/// Where its cells lie: the corner of pixel (column, row) at (x, y), sizes along x and y.
+struct Placing {
+    double x = 0, y = 0, dx = 0, dy = 0, column = 0, row = 0;
+};
+Placing placing_of(TIFF* tiff, double cells, const std::string& file)
+{
+    Placing at;
+    auto& [x, y, dx, dy, column, row] = at;
     std::uint16_t n = 0;
     double* v = nullptr;
-    double x = 0, y = 0, dx = 0, dy = 0, column = 0, row = 0;
     if (TIFFGetField(tiff, TIFFTAG_GEOTRANSMATRIX, &n, &v) && n >= 8) {
         if (v[1] != 0 || v[4] != 0) throw BadInput(fmt::format("{}: its grid is turned against the map. {}", file, remedy()));
         dx = v[0], dy = -v[5], x = v[3], y = v[7];
@@ -171,8 +128,44 @@ Layout layout(TIFF* tiff, const Path& path)
     }
     if (!(dx > 0) || !(dy > 0))
         throw BadInput(fmt::format("{}: its cells run west or south to north ({} x {}). {}", file, dx, dy, remedy()));
-    if (std::abs(dx - dy) * double(std::max(columns, rows)) > 0.1 * dx)
+    if (std::abs(dx - dy) * cells > 0.1 * dx)
         throw BadInput(fmt::format("{}: cells of {} x {} are not square. {}", file, dx, dy, remedy()));
+    return at;
+}
+
+/// What GDAL wrote beside the numbers.
+std::optional<double> nodata_of(TIFF* tiff, const std::string& file)
+{
+    std::optional<double> nodata;
+    char* text = nullptr;
+    if (TIFFGetField(tiff, gdal_nodata, &text) && text) {
+        const std::string said(text);
+        char* end = nullptr;
+        const double value = std::strtod(said.c_str(), &end);
+        if (end == said.c_str())
+            throw BadInput(fmt::format("{}: its nodata value \"{}\" is no number. Remedy: gdal_translate -a_nodata -9999 in.tif out.tif",
+                                       file, said.substr(0, 40)));
+        nodata = value;
+    }
+    if (TIFFGetField(tiff, gdal_metadata, &text) && text) {
+        const std::string said(text);
+        if (said.find("role=\"scale\"") != said.npos || said.find("role=\"offset\"") != said.npos)
+            throw BadInput(fmt::format("{}: its numbers are to be scaled or shifted to become heights. Remedy: gdal_translate -unscale -ot "
+                                       "Float32 in.tif out.tif",
+                                       file));
+    }
+    return nodata;
+}
+
+Layout layout(TIFF* tiff, const Path& path)
+{
+    const std::string file = path.string();
+    Layout l;
+    std::uint32_t columns = 0, rows = 0;
+    TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &columns);
+    TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &rows);
+    read_format(tiff, file, l);
+    const auto [x, y, dx, dy, column, row] = placing_of(tiff, double(std::max(columns, rows)), file);
     l.info.crs = crs_of(tiff, file);
     unsigned short kind = RasterPixelIsArea;
     {
@@ -185,24 +178,7 @@ Layout layout(TIFF* tiff, const Path& path)
     l.info.grid = placed(x - (column + shift) * cell, y + (row + shift) * cell - double(rows) * cell, cell, columns, rows, file);
     l.info.format = "GeoTIFF";
     l.info.numbers = fmt::format("{}{}", l.format == SAMPLEFORMAT_IEEEFP ? "float" : l.format == SAMPLEFORMAT_INT ? "int" : "uint", l.bits);
-
-    char* text = nullptr;
-    if (TIFFGetField(tiff, gdal_nodata, &text) && text) {
-        const std::string said(text);
-        char* end = nullptr;
-        const double nodata = std::strtod(said.c_str(), &end);
-        if (end == said.c_str())
-            throw BadInput(fmt::format("{}: its nodata value \"{}\" is no number. Remedy: gdal_translate -a_nodata -9999 in.tif out.tif",
-                                       file, said.substr(0, 40)));
-        l.info.nodata = nodata;
-    }
-    if (TIFFGetField(tiff, gdal_metadata, &text) && text) {
-        const std::string said(text);
-        if (said.find("role=\"scale\"") != said.npos || said.find("role=\"offset\"") != said.npos)
-            throw BadInput(fmt::format("{}: its numbers are to be scaled or shifted to become heights. Remedy: gdal_translate -unscale -ot "
-                                       "Float32 in.tif out.tif",
-                                       file));
-    }
+    l.info.nodata = nodata_of(tiff, file);
     return l;
 }
 
@@ -226,172 +202,101 @@ RasterInfo tiff_info(const Path& path)
     return layout(tiff.get(), path).info;
 }
 
+namespace {
+
+/// Reads the cells of a part into a grid, by tiles or by rows.
+class Cells {
+public:
+    Cells(TIFF* tiff, const Layout& l, const Part& part, const std::string& file, scene::Grid& to)
+        : tiff_(tiff), layout_(l), part_(part), whole_(l.info.grid), file_(file), to_(to), bytes_(l.bits / 8u)
+    {
+    }
+    void read() const { TIFFIsTiled(tiff_) ? read_tiles() : read_rows(); }
+
+private:
+    void put(int column, int row, const unsigned char* at) const
+    {
+        const double x = sample(layout_, at);
+        const auto& nodata = layout_.info.nodata;
+        if (std::isnan(x) || (nodata && (x == *nodata || (layout_.bits == 32 && x == single(*nodata))))) return;
+        if (!std::isfinite(single(x)))
+            throw BadInput(
+                fmt::format("{}: row {} from the north, column {}: {} is no height. Remedy: gdal_translate -a_nodata {} in.tif out.tif",
+                            file_, row + 1, column + 1, x, x));
+        to_.at(column - part_.column, part_.end_row - 1 - row) = single(x);
+    }
+    BadInput broken(int row, int column) const
+    {
+        return BadInput(fmt::format("{}: row {} from the north, column {}: its data cannot be decoded: {}. Remedy: copy it again, or make "
+                                    "it anew with gdal_translate",
+                                    file_, row + 1, column + 1, last_words()));
+    }
+
+    void read_tiles() const
+    {
+        std::uint32_t wide = 0, high = 0;
+        TIFFGetField(tiff_, TIFFTAG_TILEWIDTH, &wide);
+        TIFFGetField(tiff_, TIFFTAG_TILELENGTH, &high);
+        const auto size = TIFFTileSize64(tiff_);
+        const std::uint64_t most = std::uint64_t(1) << 30;
+        if (wide == 0 || high == 0 || size > most || size < std::uint64_t(wide) * high * bytes_)
+            throw BadInput(fmt::format("{}: its tiles of {} x {} cells are no good. {}", file_, wide, high, remedy()));
+        std::vector<unsigned char> tile(size);
+        const int w = int(wide), h = int(high);
+        for (int top = part_.row / h * h; top < part_.end_row; top += h)
+            for (int left = part_.column / w * w; left < part_.end_column; left += w) {
+                // A tile that was never written (sparse files) has no bytes: no data.
+                const auto which = TIFFComputeTile(tiff_, std::uint32_t(left), std::uint32_t(top), 0, 0);
+                if (TIFFGetStrileByteCount(tiff_, which) == 0) continue;
+                if (TIFFReadTile(tiff_, tile.data(), std::uint32_t(left), std::uint32_t(top), 0, 0) < 0) throw broken(top, left);
+                for (int row = std::max(top, part_.row); row < std::min(top + h, part_.end_row); ++row)
+                    for (int column = std::max(left, part_.column); column < std::min(left + w, part_.end_column); ++column)
+                        put(column, row, &tile[(std::size_t(row - top) * wide + std::size_t(column - left)) * bytes_]);
+            }
+    }
+
+    void read_rows() const
+    {
+        const auto size = TIFFScanlineSize64(tiff_);
+        if (size < std::uint64_t(whole_.columns) * bytes_ || size > std::uint64_t(whole_.columns) * bytes_ + 64)
+            throw BadInput(fmt::format("{}: its rows of {} bytes do not hold {} cells. {}", file_, size, whole_.columns, remedy()));
+        std::vector<unsigned char> line(size);
+        // A compressed strip can only be read from its beginning.
+        std::uint32_t strip_rows = 0;
+        TIFFGetFieldDefaulted(tiff_, TIFFTAG_ROWSPERSTRIP, &strip_rows);
+        const int high = int(std::clamp<std::uint32_t>(strip_rows, 1, std::uint32_t(whole_.rows)));
+        for (int row = part_.row / high * high; row < part_.end_row; ++row) {
+            const auto strip = TIFFComputeStrip(tiff_, std::uint32_t(row), 0);
+            if (TIFFGetStrileByteCount(tiff_, strip) == 0) continue;
+            if (TIFFReadScanline(tiff_, line.data(), std::uint32_t(row), 0) < 0) throw broken(row, part_.column);
+            if (row < part_.row) continue;
+            for (int column = part_.column; column < part_.end_column; ++column) put(column, row, &line[std::size_t(column) * bytes_]);
+        }
+    }
+
+    TIFF* tiff_;
+    const Layout& layout_;
+    const Part& part_;
+    const scene::Grid& whole_;
+    const std::string& file_;
+    scene::Grid& to_;
+    std::size_t bytes_; // of a number
+};
+
+} // namespace
+
 Raster read_tiff(const Path& path, const std::optional<Window>& window)
 {
     const std::string file = path.string();
     const Tiff tiff = open(path);
     const Layout l = layout(tiff.get(), path);
-    const scene::Grid& whole = l.info.grid;
-    const Part part = part_of(whole, window, file);
-    Raster r{cut(whole, part), l.info.crs};
-    if (part.empty()) return r;
-    const std::size_t bytes = l.bits / 8u;
-    const bool has_nodata = l.info.nodata.has_value();
-    const double nodata = l.info.nodata.value_or(0), rounded_nodata = single(nodata);
-    const auto put = [&](int column, int row, const unsigned char* at) {
-        const double x = sample(l, at);
-        if (std::isnan(x) || (has_nodata && (x == nodata || (l.bits == 32 && x == rounded_nodata)))) return;
-        if (!std::isfinite(single(x)))
-            throw BadInput(
-                fmt::format("{}: row {} from the north, column {}: {} is no height. Remedy: gdal_translate -a_nodata {} in.tif out.tif",
-                            file, row + 1, column + 1, x, x));
-        r.grid.at(column - part.column, part.end_row - 1 - row) = single(x);
-    };
-    const auto broken = [&](int row, int column) {
-        return BadInput(fmt::format("{}: row {} from the north, column {}: its data cannot be decoded: {}. Remedy: copy it again, or make "
-                                    "it anew with gdal_translate",
-                                    file, row + 1, column + 1, last_words));
-    };
-    if (TIFFIsTiled(tiff.get())) {
-        std::uint32_t wide = 0, high = 0;
-        TIFFGetField(tiff.get(), TIFFTAG_TILEWIDTH, &wide);
-        TIFFGetField(tiff.get(), TIFFTAG_TILELENGTH, &high);
-        const auto size = TIFFTileSize64(tiff.get());
-        const std::uint64_t most = std::uint64_t(1) << 30;
-        if (wide == 0 || high == 0 || size > most || size < std::uint64_t(wide) * high * bytes)
-            throw BadInput(fmt::format("{}: its tiles of {} x {} cells are no good. {}", file, wide, high, remedy()));
-        std::vector<unsigned char> tile(size);
-        const int w = int(wide), h = int(high);
-        for (int top = part.row / h * h; top < part.end_row; top += h)
-            for (int left = part.column / w * w; left < part.end_column; left += w) {
-                // A tile that was never written (sparse files) has no bytes: no data.
-                const auto which = TIFFComputeTile(tiff.get(), std::uint32_t(left), std::uint32_t(top), 0, 0);
-                if (TIFFGetStrileByteCount(tiff.get(), which) == 0) continue;
-                if (TIFFReadTile(tiff.get(), tile.data(), std::uint32_t(left), std::uint32_t(top), 0, 0) < 0) throw broken(top, left);
-                for (int row = std::max(top, part.row); row < std::min(top + h, part.end_row); ++row)
-                    for (int column = std::max(left, part.column); column < std::min(left + w, part.end_column); ++column)
-                        put(column, row, &tile[(std::size_t(row - top) * wide + std::size_t(column - left)) * bytes]);
-            }
-    } else {
-        const auto size = TIFFScanlineSize64(tiff.get());
-        if (size < std::uint64_t(whole.columns) * bytes || size > std::uint64_t(whole.columns) * bytes + 64)
-            throw BadInput(fmt::format("{}: its rows of {} bytes do not hold {} cells. {}", file, size, whole.columns, remedy()));
-        std::vector<unsigned char> line(size);
-        // A compressed strip can only be read from its beginning.
-        std::uint32_t strip_rows = 0;
-        TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_ROWSPERSTRIP, &strip_rows);
-        const int high = int(std::clamp<std::uint32_t>(strip_rows, 1, std::uint32_t(whole.rows)));
-        for (int row = part.row / high * high; row < part.end_row; ++row) {
-            const auto strip = TIFFComputeStrip(tiff.get(), std::uint32_t(row), 0);
-            if (TIFFGetStrileByteCount(tiff.get(), strip) == 0) continue;
-            if (TIFFReadScanline(tiff.get(), line.data(), std::uint32_t(row), 0) < 0) throw broken(row, part.column);
-            if (row < part.row) continue;
-            for (int column = part.column; column < part.end_column; ++column) put(column, row, &line[std::size_t(column) * bytes]);
-        }
-    }
+    const Part part = part_of(l.info.grid, window, file);
+    Raster r{cut(l.info.grid, part), l.info.crs};
+    if (!part.empty()) Cells(tiff.get(), l, part, file, r.grid).read();
     return r;
 }
 
-namespace {
-
-/// A TIFF in memory.
-struct Memory {
-    std::string bytes;
-    std::size_t at = 0;
-};
-Memory& memory(thandle_t h) { return *static_cast<Memory*>(h); }
-
-Tiff open_memory(Memory& m)
-{
-    set_up_libtiff();
-    return Tiff(XTIFFClientOpen(
-        "map", "wl", &m, // little endian everywhere
-        [](thandle_t h, void* to, tmsize_t n) {
-            auto& f = memory(h);
-            const std::size_t got = f.at < f.bytes.size() ? std::min(std::size_t(n), f.bytes.size() - f.at) : 0;
-            std::memcpy(to, f.bytes.data() + f.at, got);
-            f.at += got;
-            return tmsize_t(got);
-        },
-        [](thandle_t h, void* from, tmsize_t n) {
-            auto& f = memory(h);
-            if (f.bytes.size() < f.at + std::size_t(n)) f.bytes.resize(f.at + std::size_t(n), '\0');
-            std::memcpy(f.bytes.data() + f.at, from, std::size_t(n));
-            f.at += std::size_t(n);
-            return n;
-        },
-        [](thandle_t h, toff_t to, int whence) {
-            auto& f = memory(h);
-            f.at = std::size_t(to) + (whence == SEEK_CUR ? f.at : whence == SEEK_END ? f.bytes.size() : 0);
-            return toff_t(f.at);
-        },
-        [](thandle_t) { return 0; }, [](thandle_t h) { return toff_t(memory(h).bytes.size()); },
-        [](thandle_t, void**, toff_t*) { return 0; }, [](thandle_t, void*, toff_t) {}));
-}
-
-/// GeoKeys by EPSG's number where the system has one, else as ESRI's WKT, which GDAL and QGIS understand.
-void write_keys(TIFF* tiff, const std::string& crs)
-{
-    const GeoKeys keys(GTIFNew(tiff));
-    ensure(keys != nullptr, "GeoKeys cannot be written");
-    const bool geographic = is_geographic(crs);
-    const int model = geographic ? ModelTypeGeographic : ModelTypeProjected, epsg = epsg_of(crs);
-    GTIFKeySet(keys.get(), GTModelTypeGeoKey, TYPE_SHORT, 1, model);
-    GTIFKeySet(keys.get(), GTRasterTypeGeoKey, TYPE_SHORT, 1, RasterPixelIsArea);
-    const auto which = geographic ? GeographicTypeGeoKey : ProjectedCSTypeGeoKey;
-    if (epsg >= first_epsg && epsg <= last_epsg) {
-        GTIFKeySet(keys.get(), which, TYPE_SHORT, 1, epsg);
-    } else {
-        GTIFKeySet(keys.get(), which, TYPE_SHORT, 1, KvUserDefined);
-        const auto text = "ESRI PE String = " + esri_wkt(crs);
-        GTIFKeySet(keys.get(), geographic ? GeogCitationGeoKey : PCSCitationGeoKey, TYPE_ASCII, int(text.size()) + 1, text.c_str());
-    }
-    if (!geographic) GTIFKeySet(keys.get(), ProjLinearUnitsGeoKey, TYPE_SHORT, 1, Linear_Meter);
-    GTIFWriteKeys(keys.get());
-}
-
-} // namespace
 } // namespace ground
-
-std::string geotiff_bytes(const Raster& r)
-{
-    using namespace ground;
-    const scene::Grid& g = r.grid;
-    ensure(g.columns > 0 && g.rows > 0 && g.values.size() == std::size_t(g.columns) * std::size_t(g.rows),
-           "a raster to write has no cells");
-    Memory file;
-    {
-        const Tiff t = open_memory(file);
-        ensure(t != nullptr, "a TIFF cannot be made in memory");
-        TIFF* tiff = t.get();
-        TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, std::uint32_t(g.columns));
-        TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, std::uint32_t(g.rows));
-        TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 32);
-        TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
-        TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-        TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-        TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-        TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-        TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, std::uint32_t(std::clamp(65536 / (4 * g.columns), 1, g.rows)));
-        const double scale[3] = {g.cell, g.cell, 0};
-        const double tie[6] = {0, 0, 0, g.x - 0.5 * g.cell, g.y + (g.rows - 0.5) * g.cell, 0};
-        TIFFSetField(tiff, TIFFTAG_GEOPIXELSCALE, 3, scale);
-        TIFFSetField(tiff, TIFFTAG_GEOTIEPOINTS, 6, tie);
-        TIFFSetField(tiff, gdal_nodata, "-9999");
-        if (!r.crs.empty()) write_keys(tiff, r.crs);
-        std::vector<float> line(std::size_t(g.columns));
-        for (int row = g.rows - 1; row >= 0; --row) {
-            for (int column = 0; column < g.columns; ++column) {
-                const double x = g.at(column, row);
-                line[std::size_t(column)] = std::isnan(x) ? -9999.f : float(x);
-            }
-            ensure(TIFFWriteScanline(tiff, line.data(), std::uint32_t(g.rows - 1 - row), 0) >= 0, "a TIFF's row cannot be written");
-        }
-    }
-    return std::move(file.bytes);
-}
-
-void write_geotiff(const Place& place, const Raster& raster) { write_atomically(place, geotiff_bytes(raster)); }
 
 #else
 
@@ -399,9 +304,6 @@ namespace ground {
 RasterInfo tiff_info(const Path&) { return {}; }
 Raster read_tiff(const Path&, const std::optional<Window>&) { return {}; }
 } // namespace ground
-std::string geotiff_bytes(const Raster&) { throw Broken("maps are written by a program that was built without them"); }
-void write_geotiff(const Place&, const Raster&) { throw Broken("maps are written by a program that was built without them"); }
-
 #endif
 
 } // namespace kuzure::io

@@ -18,8 +18,8 @@ struct Outlines {
     std::vector<Outline> features;
     std::string crs; // WKT; empty: none
 };
-/// Polygons of a .shp or GeoJSON. Throws BadInput with file and feature (from 1): open or crossing rings, features in one another, no
-/// areas.
+/// Polygons of a .shp or GeoJSON. Throws BadInput with file and feature (from 1): open or crossing rings, features in
+/// one another, no areas.
 Outlines read_outlines(const Path&);
 
 struct NamedPoint {

@@ -49,6 +49,21 @@ void sort_heights(Height* begin, Height* end)
     }
 }
 
+/// Turns counts of columns by thread into the places where each thread's particles begin.
+void begin_columns(std::vector<std::vector<Index>>& histogram, std::vector<Index>& start, std::size_t count)
+{
+    Index at = 0;
+    for (std::size_t c = 0; c < count; ++c) {
+        start[c] = at;
+        for (auto& mine : histogram) {
+            const Index here = mine[c];
+            mine[c] = at;
+            at += here;
+        }
+    }
+    start[count] = at;
+}
+
 } // namespace
 
 ColumnSort sort_into_columns(const Columns& columns, const double* x, const double* y, const double* z, const std::int64_t* id, Index n)
@@ -91,18 +106,7 @@ ColumnSort sort_into_columns(const Columns& columns, const double* x, const doub
         }
 #pragma omp barrier
 #pragma omp single
-        {
-            Index at = 0;
-            for (std::size_t c = 0; c < count; ++c) {
-                s.start[c] = at;
-                for (int k = 0; k < threads; ++k) {
-                    const Index here = histogram[k][c];
-                    histogram[k][c] = at;
-                    at += here;
-                }
-            }
-            s.start[count] = at;
-        }
+        begin_columns(histogram, s.start, count);
         for (Index i = begin; i < end; ++i) heights[mine[cx[i]]++] = {z[i], id[i], i};
 #pragma omp barrier
 #pragma omp for schedule(dynamic, 64)

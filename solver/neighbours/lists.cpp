@@ -195,6 +195,96 @@ private:
     std::vector<Around> around_;
 };
 
+/// The first cluster of each column, and the end: clusters are runs of `width` particles.
+std::vector<Index> cluster_starts(const ColumnSort& cols, int width)
+{
+    const std::size_t n_columns = std::size_t(cols.nx) * cols.ny;
+    std::vector<Index> start(n_columns + 1, 0);
+    for (std::size_t c = 0; c < n_columns; ++c) start[c + 1] = start[c] + (cols.start[c + 1] - cols.start[c] + width - 1) / width;
+    return start;
+}
+
+/// Where the lists of a cluster begin, in the stores of one thread.
+struct Stored {
+    int thread;
+    std::size_t soil, walls;
+};
+
+/// Where single-precision coordinates begin, the middle of the owned soil, and the reach (m) with slack for their rounding.
+struct Frame {
+    Vector origin;
+    float reach;
+};
+Frame frame_of(const SortedPoints& owned, double reach)
+{
+    Vector lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+    for (Index i = 0; i < owned.n; ++i) {
+        lo = {std::min(lo.x, owned.x[i]), std::min(lo.y, owned.y[i]), std::min(lo.z, owned.z[i])};
+        hi = {std::max(hi.x, owned.x[i]), std::max(hi.y, owned.y[i]), std::max(hi.z, owned.z[i])};
+    }
+    const double extent = owned.n ? std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) + 4 * reach : 0;
+    return {owned.n ? 0.5 * (lo + hi) : Vector{}, float(reach * (1 + 1e-6) + 1e-6 * extent)};
+}
+
+Cluster cluster_of(const SortedPoints& p, Index begin, Index end, Vector origin)
+{
+    Cluster c;
+    for (Index k = begin; k < end; ++k) c.add({float(p.x[k] - origin.x), float(p.y[k] - origin.y), float(p.z[k] - origin.z)});
+    return c;
+}
+
+/// The lists that one thread finds, one behind the other.
+class ThreadLists {
+    static auto grower(Array<Index>& a)
+    {
+        return [&a](std::size_t need) { a.resize(std::max(need, a.size() + a.size() / 2 + 4096)); };
+    }
+
+public:
+    ThreadLists(const Candidates& soil, const std::vector<Candidates>& walls, const Columns& columns, const Frame& frame,
+                Array<Index>& soil_store, Array<Index>& wall_store)
+        : soil_(soil_store), walls_(wall_store)
+    {
+        finders_.emplace_back(soil, columns, frame.origin, frame.reach);
+        for (const auto& w : walls) finders_.emplace_back(w, columns, frame.origin, frame.reach);
+    }
+    void enter(std::int32_t cx, std::int32_t cy, std::int32_t rx, std::int32_t ry)
+    {
+        for (auto& f : finders_) f.enter(cx, cy, rx, ry);
+    }
+    std::size_t soil() const { return n_soil_; }
+    std::size_t walls() const { return n_walls_; }
+    std::span<const Index> append_soil(const Cluster& c)
+    {
+        const std::size_t before = n_soil_;
+        n_soil_ = finders_[0].append(c, soil_, n_soil_, grower(soil_));
+        return {soil_.data() + before, soil_.data() + n_soil_};
+    }
+    /// Number of a wall, how many points, the points; for each wall near by. Returns how many points in all.
+    std::size_t append_walls(const Cluster& c)
+    {
+        std::size_t sum = 0;
+        for (std::size_t w = 0; w + 1 < finders_.size(); ++w) {
+            if (walls_.size() < n_walls_ + 2) grower(walls_)(n_walls_ + 2);
+            const std::size_t head = n_walls_;
+            n_walls_ = finders_[w + 1].append(c, walls_, n_walls_ + 2, grower(walls_));
+            const std::size_t found = n_walls_ - head - 2;
+            if (found == 0) {
+                n_walls_ = head;
+                continue;
+            }
+            walls_[head] = Index(w), walls_[head + 1] = Index(found);
+            sum += found;
+        }
+        return sum;
+    }
+
+private:
+    Array<Index>&soil_, &walls_;
+    std::size_t n_soil_ = 0, n_walls_ = 0;
+    std::vector<Finder> finders_;
+};
+
 } // namespace
 
 void ClusterLists::build(const Columns& columns, const SortedPoints& owned, const SortedPoints& ghosts, std::span<const WallPoints> walls,
@@ -202,93 +292,50 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
 {
     ensure(width >= 1 && width <= 16, "a cluster holds 1 to 16 particles");
     width_ = width;
-    // ---- clusters: runs of `width` in each column
     const auto& cols = *owned.columns;
     const std::size_t n_columns = std::size_t(cols.nx) * cols.ny;
-    std::vector<Index> cluster_start(n_columns + 1, 0);
-    for (std::size_t c = 0; c < n_columns; ++c)
-        cluster_start[c + 1] = cluster_start[c] + (cols.start[c + 1] - cols.start[c] + width - 1) / width;
-    const Index n = n_columns ? cluster_start[n_columns] : 0;
+    const std::vector<Index> cluster_start = cluster_starts(cols, width);
+    const Index n = cluster_start[n_columns];
     first_.resize(n), count_.resize(n), soil_.resize(n), walls_.resize(n), n_soil_.resize(n), n_walls_.resize(n), pruned_.resize(n);
     n_pruned_.resize(n);
 
-    // ---- single-precision coordinates relative to the middle of the owned soil, with slack for their rounding
-    Vector lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-    for (Index i = 0; i < owned.n; ++i) {
-        lo = {std::min(lo.x, owned.x[i]), std::min(lo.y, owned.y[i]), std::min(lo.z, owned.z[i])};
-        hi = {std::max(hi.x, owned.x[i]), std::max(hi.y, owned.y[i]), std::max(hi.z, owned.z[i])};
-    }
-    const Vector origin = owned.n ? 0.5 * (lo + hi) : Vector{};
-    const double extent = owned.n ? std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) + 4 * reach : 0;
-    const float slack_reach = float(reach * (1 + 1e-6) + 1e-6 * extent);
-    const Candidates soil = merge(owned, ghosts, origin);
+    const Frame frame = frame_of(owned, reach);
+    const Candidates soil = merge(owned, ghosts, frame.origin);
     std::vector<Candidates> wall_points;
-    for (const auto& w : walls) wall_points.push_back(of_walls(w, origin));
+    for (const auto& w : walls) wall_points.push_back(of_walls(w, frame.origin));
 
     const int threads = omp_get_max_threads();
     soil_store_.resize(threads), wall_store_.resize(threads), pruned_store_.resize(threads);
-    struct Stored {
-        int thread;
-        std::size_t soil, walls;
-    };
     Array<Stored> stored(n);
     std::vector<std::uint8_t> has_ghost(n, 0);
     std::size_t entries = 0, wall_entries = 0;
-    const auto column_reach = [&](double w) { return std::int32_t(std::ceil(slack_reach / w)); };
+    const auto column_reach = [&](double w) { return std::int32_t(std::ceil(frame.reach / w)); };
     const std::int32_t rx = column_reach(columns.width_x), ry = columns.flat ? 0 : column_reach(columns.width_y);
 
 #pragma omp parallel num_threads(threads) reduction(+ : entries, wall_entries)
     {
         const int t = omp_get_thread_num();
-        auto &out = soil_store_[t], &wall_out = wall_store_[t];
-        std::size_t used = 0, wall_used = 0;
-        std::vector<Finder> finders;
-        finders.emplace_back(soil, columns, origin, slack_reach);
-        for (const auto& w : wall_points) finders.emplace_back(w, columns, origin, slack_reach);
-        const auto grower = [](Array<Index>& a) {
-            return [&a](std::size_t need) { a.resize(std::max(need, a.size() + a.size() / 2 + 4096)); };
-        };
+        ThreadLists lists(soil, wall_points, columns, frame, soil_store_[t], wall_store_[t]);
 #pragma omp for schedule(dynamic, 16)
         for (std::int64_t column = 0; column < std::int64_t(n_columns); ++column) {
-            const std::int32_t cx = cols.x0 + std::int32_t(column % cols.nx), cy = cols.y0 + std::int32_t(column / cols.nx);
             Index begin = cols.start[column];
             const Index end = cols.start[column + 1];
             if (begin == end) continue;
-            for (auto& f : finders) f.enter(cx, cy, rx, ry);
+            lists.enter(cols.x0 + std::int32_t(column % cols.nx), cols.y0 + std::int32_t(column / cols.nx), rx, ry);
             for (Index c = cluster_start[column]; c < cluster_start[column + 1]; ++c, begin += width) {
                 const int members = int(std::min<Index>(width, end - begin));
-                Cluster cl;
-                for (int k = 0; k < members; ++k)
-                    cl.add(
-                        {float(owned.x[begin + k] - origin.x), float(owned.y[begin + k] - origin.y), float(owned.z[begin + k] - origin.z)});
+                const Cluster cl = cluster_of(owned, begin, begin + members, frame.origin);
                 first_[c] = begin, count_[c] = std::int8_t(members);
-                stored[c] = {t, used, wall_used};
-                const std::size_t before = used;
-                used = finders[0].append(cl, out, used, grower(out));
-                n_soil_[c] = Index(used - before);
-                entries += used - before;
-                for (std::size_t k = before; k < used; ++k)
-                    if (out[k] >= owned.n) {
-                        has_ghost[c] = 1;
-                        break;
-                    }
-                const std::size_t wall_before = wall_used;
-                for (std::size_t w = 0; w < walls.size(); ++w) {
-                    if (wall_out.size() < wall_used + 2) grower(wall_out)(wall_used + 2);
-                    const std::size_t head = wall_used;
-                    wall_used = finders[w + 1].append(cl, wall_out, wall_used + 2, grower(wall_out));
-                    const std::size_t found = wall_used - head - 2;
-                    if (found == 0) {
-                        wall_used = head;
-                        continue;
-                    }
-                    wall_out[head] = Index(w), wall_out[head + 1] = Index(found);
-                    wall_entries += found;
-                }
-                n_walls_[c] = Index(wall_used - wall_before);
+                stored[c] = {t, lists.soil(), lists.walls()};
+                const auto found = lists.append_soil(cl);
+                n_soil_[c] = Index(found.size()), entries += found.size();
+                has_ghost[c] = std::ranges::any_of(found, [&](Index j) { return j >= owned.n; });
+                wall_entries += lists.append_walls(cl);
+                n_walls_[c] = Index(lists.walls() - stored[c].walls);
             }
         }
         // Untouched until a thread of the pass writes it.
+        const std::size_t used = lists.soil();
         if (pruned_store_[t].size() < used + narrow) pruned_store_[t].resize(used + used / 8 + narrow);
     }
     entries_ = entries, wall_entries_ = wall_entries;

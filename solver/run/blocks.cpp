@@ -177,20 +177,75 @@ StepWork BlockSoil::work(const Block& b) const
     return work_of_[like] = w;
 }
 
+/// A block near another, as that sees it: where its soil is at home, across which periods, and the way to it.
+struct BlockSoil::Sight {
+    Block home, way;
+    int owner;
+    std::array<std::int8_t, 3> period_shift;
+};
+
+/// Counts the particles of one block that are near the soil of some others.
+class BlockSoil::NearRows {
+public:
+    NearRows(const BlockSoil& soil, const Block& b, double safe)
+        : soil_(soil), block_(b), reach2_(safe * safe), like_(soil.next_block_holds(safe) ? soil.pattern_key(b) : std::string())
+    {
+    }
+    std::int64_t near(std::span<const Sight> sights)
+    {
+        std::string key;
+        if (!like_.empty()) {
+            std::uint32_t mask = 0;
+            for (const Sight& s : sights) mask |= 1u << ((s.way[0] + 1) * 9 + (s.way[1] + 1) * 3 + s.way[2] + 1);
+            key = fmt::format("{}|{}", mask, like_);
+            const std::lock_guard lock(soil_.mutex_);
+            if (const auto known = soil_.rows_of_.find(key); known != soil_.rows_of_.end()) return known->second;
+        }
+        if (points_.empty()) soil_.points(block_, points_);
+        find_boxes(sights);
+        const double none[3] = {0, 0, 0};
+        std::int64_t n = 0;
+        for (const Vector& x : points_)
+            n += std::ranges::any_of(sights, [&](const Sight& s) { return squared_distance(x, none, boxes_.at(s.way)) <= reach2_; });
+        if (!key.empty()) {
+            const std::lock_guard lock(soil_.mutex_);
+            soil_.rows_of_[key] = n;
+        }
+        return n;
+    }
+
+private:
+    void find_boxes(std::span<const Sight> sights)
+    {
+        const auto length = soil_.space_.period_length();
+        std::vector<Vector> some;
+        for (const Sight& s : sights) {
+            if (boxes_.contains(s.way)) continue;
+            Bounds box = Bounds::none();
+            some.clear();
+            soil_.points(s.home, some);
+            for (const Vector& x : some)
+                box.add(x + Vector{s.period_shift[0] * length[0], s.period_shift[1] * length[1], s.period_shift[2] * length[2]});
+            boxes_[s.way] = box;
+        }
+    }
+
+    const BlockSoil& soil_;
+    const Block& block_;
+    double reach2_;
+    std::string like_; // blocks of this pattern have the same rows; empty where that is not so
+    std::vector<Vector> points_;
+    std::map<Block, Bounds> boxes_; // by way
+};
+
 BlockSoil::HaloDemand BlockSoil::halo_demand(const Block& b, int mine, const std::function<int(const Block&)>& owner_of, double reach) const
 {
-    struct Sight {
-        Block home;
-        Block way;
-        int owner;
-        std::array<std::int8_t, 3> period_shift;
-    };
     std::vector<Sight> around_me;
     const auto length = space_.period_length();
     double extent = 0;
     for (int a = 0; a < 3; ++a)
         if (space_.period()[a]) extent = std::max({extent, std::abs(space_.period_low()[a]), std::abs(length[a])});
-    const double safe = halo_reach(reach, extent), reach2 = safe * safe;
+    const double safe = halo_reach(reach, extent);
     around(b, safe, [&](const Block& home, const Block& way, const std::array<std::int8_t, 3>& period_shift) {
         const int owner = owner_of(home);
         if (owner < 0 || (owner == mine && period_shift == std::array<std::int8_t, 3>{})) return;
@@ -200,47 +255,15 @@ BlockSoil::HaloDemand BlockSoil::halo_demand(const Block& b, int mine, const std
     if (around_me.empty()) return result;
     std::ranges::stable_sort(around_me, {}, [](const Sight& s) { return std::pair(s.owner, s.period_shift); });
 
-    const std::string like = next_block_holds(safe) ? pattern_key(b) : std::string();
-    std::vector<Vector> points_here;
-    std::map<Block, Bounds> boxes; // by way
-    const auto rows = [&](std::span<const Sight> sights) {
-        std::string key;
-        if (!like.empty()) {
-            std::uint32_t mask = 0;
-            for (const Sight& s : sights) mask |= 1u << ((s.way[0] + 1) * 9 + (s.way[1] + 1) * 3 + s.way[2] + 1);
-            key = fmt::format("{}|{}", mask, like);
-            const std::lock_guard lock(mutex_);
-            if (const auto known = rows_of_.find(key); known != rows_of_.end()) return known->second;
-        }
-        if (points_here.empty()) points(b, points_here);
-        std::vector<Vector> some;
-        for (const Sight& s : sights) {
-            if (boxes.contains(s.way)) continue;
-            Bounds box = Bounds::none();
-            some.clear();
-            points(s.home, some);
-            for (const Vector& x : some)
-                box.add(x + Vector{s.period_shift[0] * length[0], s.period_shift[1] * length[1], s.period_shift[2] * length[2]});
-            boxes[s.way] = box;
-        }
-        const double none[3] = {0, 0, 0};
-        std::int64_t n = 0;
-        for (const Vector& x : points_here)
-            n += std::ranges::any_of(sights, [&](const Sight& s) { return squared_distance(x, none, boxes.at(s.way)) <= reach2; });
-        if (!key.empty()) {
-            const std::lock_guard lock(mutex_);
-            rows_of_[key] = n;
-        }
-        return n;
-    };
+    NearRows rows(*this, b, safe);
     for (std::size_t from = 0, to; from < around_me.size(); from = to) {
         const Sight& first = around_me[from];
         for (to = from; to < around_me.size() && around_me[to].owner == first.owner && around_me[to].period_shift == first.period_shift;)
             ++to;
-        const std::int64_t n = rows(std::span(around_me).subspan(from, to - from));
+        const std::int64_t n = rows.near(std::span(around_me).subspan(from, to - from));
         if (n > 0) result.by.push_back({first.owner, first.period_shift, n});
     }
-    result.seen = rows(around_me);
+    result.seen = rows.near(around_me);
     return result;
 }
 

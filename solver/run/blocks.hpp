@@ -74,6 +74,8 @@ protected:
     const BlockSpace& space_;
 
 private:
+    struct Sight;
+    class NearRows;
     /// Visits the blocks around one, itself among them: visit(wrapped block, way there in blocks, periods crossed).
     template <class Visit> void around(const Block&, double reach, Visit visit) const;
     /// One block each way holds everything within reach.

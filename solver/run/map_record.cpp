@@ -170,7 +170,7 @@ void MapRecord::remember(CellMemory& m, const CellSoil& s, double time) const
     m.pressure = std::max(m.pressure, s.density * s.speed * s.speed);
 }
 
-void MapRecord::look(const Particles& p, double time)
+void MapRecord::sample(const Particles& p, double time)
 {
     for (const auto& s : sums_here(p))
         if (s.cell < grid_.count()) remember(state_.cells[s.cell], soil_of(s, units_, grid_.area()), time);
@@ -179,14 +179,14 @@ void MapRecord::look(const Particles& p, double time)
 
 void MapRecord::begin(const Particles& p)
 {
-    look(p, 0);
+    sample(p, 0);
     for (auto& [cell, memory] : state_.cells) memory.start = memory.thickness;
 }
 
 void MapRecord::after_step(const Particles& p, double time, double dt, double max_speed)
 {
     state_.way += dt * max_speed;
-    if (state_.way >= 0.25 * grid_.cell || time - state_.last >= pause_) look(p, time);
+    if (state_.way >= 0.25 * grid_.cell || time - state_.last >= pause_) sample(p, time);
 }
 
 std::vector<MapCell> MapRecord::cells(const Particles& p, double time, double& beyond) const

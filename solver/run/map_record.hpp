@@ -60,7 +60,7 @@ struct MapCell {
 /// A row of a map record in a checkpoint: the cell, then its memory.
 using MapRow = std::array<double, 8>;
 
-/// The memory of all cells, each kept by one rank. It looks at the soil when some of it may have moved by a quarter of a cell, and at least
+/// The memory of all cells, each kept by one rank. It samples the soil when some of it may have moved by a quarter of a cell, and at least
 /// once in the time in which soil falls by half a cell; both are known to all ranks alike, so that the maps are the same on any of them.
 class MapRecord {
 public:
@@ -79,8 +79,8 @@ public:
 
     /// All that a restart needs. The cells are those of this rank; on reading, any ranks may bring them.
     struct State {
-        double way = 0;  // m, since the last look
-        double last = 0; // s, time of the last look
+        double way = 0;  // m, since it last sampled
+        double last = 0; // s, when that was
         std::unordered_map<std::int64_t, CellMemory> cells;
     };
     const State& state() const { return state_; }
@@ -90,7 +90,7 @@ public:
     bool set(double way, double last, std::span<const MapRow>);
 
 private:
-    void look(const Particles&, double time);
+    void sample(const Particles&, double time);
     /// Collective: the sums of the cells that this rank keeps.
     std::vector<CellSums> sums_here(const Particles&) const;
     int keeper(std::int64_t cell) const;

@@ -69,8 +69,8 @@ double displacement(const Comm& comm, const Particles& p)
     return comm.max(d);
 }
 
-/// Runs until the soil rests; false if it moves by more than `most` m, no longer becomes slower, or its time is over. `crossing`:
-/// time_through_height().
+/// Runs until the soil rests; false if it moves by more than `most` m, no longer becomes slower, or its time is over.
+/// `crossing`: time_through_height().
 bool come_to_rest(Simulation& sim, const RunOptions& options, double most, double crossing, Settling& s)
 {
     const double slow = settled_speed(sim.scene()), weak = settled_acceleration(sim.scene());

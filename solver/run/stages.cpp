@@ -78,7 +78,7 @@ void Simulation::require_room(const Scene& before)
     double deepest = 0;
     std::int64_t id = -1;
     std::string piece;
-    const auto look = [&](const scene::Shape& shape, int own_body, const std::string& name) {
+    const auto find_deepest = [&](const scene::Shape& shape, int own_body, const std::string& name) {
         for (Index i = 0; i < particles_.size(); ++i) {
             const std::int64_t particle = std::as_const(particles_)[field::id][i];
             const double depth = -scene::signed_distance(shape, std::as_const(particles_)[field::position][i], scene_.dimensions);
@@ -87,10 +87,11 @@ void Simulation::require_room(const Scene& before)
         }
     };
     for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-        if (!before.walls[w].present && scene_.walls[w].present) look(scene_.walls[w].shape, -1, scene::name_of_wall(scene_, int(w)));
+        if (!before.walls[w].present && scene_.walls[w].present)
+            find_deepest(scene_.walls[w].shape, -1, scene::name_of_wall(scene_, int(w)));
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
         if (!before.bodies[b].present && scene_.bodies[b].present)
-            look(scene_.bodies[b].shape, int(b), scene::name_of_body(scene_, int(b)));
+            find_deepest(scene_.bodies[b].shape, int(b), scene::name_of_body(scene_, int(b)));
     const double all = comm_.max(deepest);
     if (all <= limit::in_new_piece * scene_.space.spacing) return;
     const int root = int(comm_.max(std::int64_t(deepest == all ? comm_.rank() : -1)));

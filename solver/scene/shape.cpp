@@ -244,6 +244,52 @@ double volume(const Shape& shape, int dimensions)
     return std::visit(of, shape);
 }
 
+namespace {
+
+/// In plan, within its outline or its map of thicknesses; z not yet.
+Box plan_of(const Release& r)
+{
+    const auto& f = *r.bed;
+    const double far = std::numeric_limits<double>::infinity();
+    Box box{{f.low_x(), f.low_y(), far}, {f.high_x(), f.high_y(), -far}};
+    if (!r.rings.empty()) {
+        Box around{{far, far, 0}, {-far, -far, 0}};
+        for (const Ring& ring : r.rings)
+            for (const auto& [px, py] : ring) {
+                around.low.x = std::min(around.low.x, px), around.low.y = std::min(around.low.y, py);
+                around.high.x = std::max(around.high.x, px), around.high.y = std::max(around.high.y, py);
+            }
+        box.low.x = std::max(box.low.x, around.low.x), box.low.y = std::max(box.low.y, around.low.y);
+        box.high.x = std::min(box.high.x, around.high.x), box.high.y = std::min(box.high.y, around.high.y);
+    } else if (r.thicknesses) {
+        const Grid& g = *r.thicknesses;
+        box.low.x = std::max(box.low.x, g.x), box.low.y = std::max(box.low.y, g.y);
+        box.high.x = std::min(box.high.x, g.x + (g.columns - 1) * g.cell), box.high.y = std::min(box.high.y, g.y + (g.rows - 1) * g.cell);
+    }
+    return box;
+}
+
+Box bounds_of(const Release& r)
+{
+    Box box = plan_of(r);
+    double thickest = r.thicknesses ? 0 : r.thickness.value_or(0);
+    if (r.thicknesses)
+        for (const double h : r.thicknesses->values) thickest = std::max(thickest, h);
+    // Between its points a quadratic surface leaves their heights by less than they differ.
+    const Grid& g = r.bed->grid();
+    const double cell = g.cell;
+    for (int j = 0; j < g.rows; ++j)
+        for (int i = 0; i < g.columns; ++i) {
+            const double x = g.x + i * cell, y = g.y + j * cell;
+            if (x < box.low.x - cell || x > box.high.x + cell || y < box.low.y - cell || y > box.high.y + cell) continue;
+            if (const double z = g.at(i, j); std::isfinite(z)) box.low.z = std::min(box.low.z, z), box.high.z = std::max(box.high.z, z);
+        }
+    box.high.z += thickest;
+    return box;
+}
+
+} // namespace
+
 Box bounds(const Shape& shape)
 {
     struct {
@@ -262,41 +308,7 @@ Box bounds(const Shape& shape)
             return {{g.field->low_x(), g.field->low_y(), g.field->lowest() - g.depth},
                     {g.field->high_x(), g.field->high_y(), g.field->highest()}};
         }
-        Box operator()(const Release& r) const
-        {
-            const auto& f = *r.bed;
-            const double far = std::numeric_limits<double>::infinity(), cell = f.grid().cell;
-            Box box{{f.low_x(), f.low_y(), far}, {f.high_x(), f.high_y(), -far}};
-            if (!r.rings.empty()) {
-                Box around{{far, far, 0}, {-far, -far, 0}};
-                for (const Ring& ring : r.rings)
-                    for (const auto& [px, py] : ring) {
-                        around.low.x = std::min(around.low.x, px), around.low.y = std::min(around.low.y, py);
-                        around.high.x = std::max(around.high.x, px), around.high.y = std::max(around.high.y, py);
-                    }
-                box.low.x = std::max(box.low.x, around.low.x), box.low.y = std::max(box.low.y, around.low.y);
-                box.high.x = std::min(box.high.x, around.high.x), box.high.y = std::min(box.high.y, around.high.y);
-            } else if (r.thicknesses) {
-                const Grid& g = *r.thicknesses;
-                box.low.x = std::max(box.low.x, g.x), box.low.y = std::max(box.low.y, g.y);
-                box.high.x = std::min(box.high.x, g.x + (g.columns - 1) * g.cell),
-                box.high.y = std::min(box.high.y, g.y + (g.rows - 1) * g.cell);
-            }
-            double thickest = r.thicknesses ? 0 : r.thickness.value_or(0);
-            if (r.thicknesses)
-                for (const double h : r.thicknesses->values) thickest = std::max(thickest, h);
-            // Between its points a quadratic surface leaves their heights by less than they differ.
-            const Grid& g = f.grid();
-            for (int j = 0; j < g.rows; ++j)
-                for (int i = 0; i < g.columns; ++i) {
-                    const double x = g.x + i * cell, y = g.y + j * cell;
-                    if (x < box.low.x - cell || x > box.high.x + cell || y < box.low.y - cell || y > box.high.y + cell) continue;
-                    if (const double z = g.at(i, j); std::isfinite(z))
-                        box.low.z = std::min(box.low.z, z), box.high.z = std::max(box.high.z, z);
-                }
-            box.high.z += thickest;
-            return box;
-        }
+        Box operator()(const Release& r) const { return bounds_of(r); }
         Box operator()(const Polygon& p) const
         {
             const double far = std::numeric_limits<double>::infinity();

@@ -59,8 +59,7 @@ std::string packages_text();
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package
 /// installed under lib/kuzure. "kuzure" where the system does not say.
 io::Path own_path();
-/// Throws BadInput on all ranks where they are different programs, or built for different instruction sets: their bits would differ.
-/// Collective.
+/// Collective. Throws BadInput where ranks are different programs, or built for different instruction sets: their bits would differ.
 void require_one_program(const Comm&);
 
 /// The cores this process may use.

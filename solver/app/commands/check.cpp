@@ -15,22 +15,6 @@ namespace kuzure {
 
 namespace {
 
-/// kuzure check --accuracy: settings from the measured table.
-Exit turn_the_dial(const Comm& comm, const Scene& s, const std::string& accuracy, bool json)
-{
-    const double wanted = study::parse_accuracy(accuracy);
-    use_threads(comm, 0);
-    const auto estimate_of = [](const scene::CheckedScene& r) {
-        return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd));
-    };
-    const auto proposal = study::propose(s, wanted, study::measured(), [&](const scene::CheckedScene& r) { return work(estimate_of(r)); });
-    const auto& r = *proposal.checked;
-    const double seconds = forecast(comm, r.scene, r.filling, estimate_of(r)).seconds;
-    if (comm.rank() == 0)
-        fmt::print("{}", json ? study::to_json(proposal, wanted, seconds).dump(2) + "\n" : study::to_text(proposal, wanted, seconds));
-    return Exit::Ok;
-}
-
 struct Arguments {
     SceneArguments scene;
     bool json = false;
@@ -44,7 +28,7 @@ Exit print_facts(const Comm& comm, const Arguments& a)
     const auto& [s, scene_warnings, filling] = checked;
     const auto uncertain = io::parse_uncertain(io::read_scene_text(a.scene.file), a.scene.file, a.scene.sets);
     if (!a.within.empty()) return hazard::print_what_fits(comm, checked, uncertain, {a.scene.file, a.within, a.machine, a.ranks, a.json});
-    if (!a.accuracy.empty()) return turn_the_dial(comm, s, a.accuracy, a.json);
+    if (!a.accuracy.empty()) return study::print_proposal(comm, s, a.accuracy, a.json);
     const auto model = choose_model(s, Arithmetic::Simd);
     const Estimate e = estimate(s, filling, *model);
     const double memory = e.memory + bytes_per_process * comm.size();
@@ -82,7 +66,12 @@ Exit print_facts(const Comm& comm, const Arguments& a)
 
 } // namespace
 
-Exit print_estimate(const Comm& comm, const SceneArguments& scene) { return print_facts(comm, {.scene = scene}); }
+Exit print_estimate(const Comm& comm, const SceneArguments& scene)
+{
+    Arguments a;
+    a.scene = scene;
+    return print_facts(comm, a);
+}
 
 void add_check(CLI::App& app, Action& chosen)
 {

@@ -30,50 +30,67 @@ std::vector<Words> not_modelled(const Base& base)
     return all;
 }
 
+namespace {
+
+Json json_of(const Run& r, const std::vector<Input>& inputs, const Answer& a)
+{
+    Json settings = Json::object();
+    for (std::size_t k = 0; k < inputs.size(); ++k) settings[inputs[k].name] = r.member.values[k];
+    Json j{{"directory", r.directory.string()},
+           {"part", word(r.part)},
+           {"number", r.member.number},
+           {"status", word(r.status)},
+           {"counted", std::ranges::find_if(a.counted, [&](const Run* c) { return c->directory == r.directory; }) != a.counted.end()},
+           {"settings", settings},
+           {"layers", r.layers},
+           {"spacing", r.spacing},
+           {"seconds", r.seconds},
+           {"reach", r.finished() ? Json(r.maps->reach) : Json()},
+           {"volume", r.finished() ? Json(r.maps->volume) : Json()}};
+    if (!r.message.empty()) j["message"] = r.message;
+    if (!r.notes.empty()) j["notes"] = r.notes;
+    return j;
+}
+
+Json json_of(const std::vector<Input>& inputs)
+{
+    Json list = Json::array();
+    for (const auto& i : inputs)
+        list.push_back({{"name", i.name}, {"unit", i.unit}, {"low", i.range.low}, {"likely", i.range.likely}, {"high", i.range.high}});
+    return list;
+}
+
+Json sensitivity_of(const Answer& a)
+{
+    Json list = Json::array();
+    for (const auto& s : a.sensitivity)
+        list.push_back({{"input", s.input},
+                        {"rank_correlation", number(s.correlation)},
+                        {"interval", {number(s.interval[0]), number(s.interval[1])}}});
+    return list;
+}
+
+Json english(const std::vector<Words>& lines)
+{
+    Json list = Json::array();
+    for (const auto& w : lines) list.push_back(w.en);
+    return list;
+}
+
+} // namespace
+
 Json to_json(const State& st, const Answer& a)
 {
     const auto inputs = inputs_of(st.base.uncertain);
-    const auto run = [&](const Run& r) {
-        Json settings = Json::object();
-        for (std::size_t k = 0; k < inputs.size(); ++k) settings[inputs[k].name] = r.member.values[k];
-        Json j{{"directory", r.directory.string()},
-               {"part", word(r.part)},
-               {"number", r.member.number},
-               {"status", word(r.status)},
-               {"counted", std::ranges::find_if(a.counted, [&](const Run* c) { return c->directory == r.directory; }) != a.counted.end()},
-               {"settings", settings},
-               {"layers", r.layers},
-               {"spacing", r.spacing},
-               {"seconds", r.seconds},
-               {"reach", r.finished() ? Json(r.maps->reach) : Json()},
-               {"volume", r.finished() ? Json(r.maps->volume) : Json()}};
-        if (!r.message.empty()) j["message"] = r.message;
-        if (!r.notes.empty()) j["notes"] = r.notes;
-        return j;
-    };
     Json members = Json::array(), likely = Json::array();
     int finished = 0, failed = 0;
     double layers = 0;
     for (const auto& r : st.runs) {
-        (r.part == Part::Member ? members : likely).push_back(run(r));
+        (r.part == Part::Member ? members : likely).push_back(json_of(r, inputs, a));
         if (r.part == Part::Member) finished += r.finished(), failed += r.status == Status::Failed || r.status == Status::Refused;
         if (r.finished() && r.part != Part::Member) layers = std::max(layers, r.layers);
     }
     for (const auto* r : a.counted) layers = layers > 0 ? layers : r->layers;
-    Json inputs_json = Json::array();
-    for (const auto& i : inputs)
-        inputs_json.push_back(
-            {{"name", i.name}, {"unit", i.unit}, {"low", i.range.low}, {"likely", i.range.likely}, {"high", i.range.high}});
-    Json sensitivity = Json::array();
-    for (const auto& s : a.sensitivity)
-        sensitivity.push_back({{"input", s.input},
-                               {"rank_correlation", number(s.correlation)},
-                               {"interval", {number(s.interval[0]), number(s.interval[1])}}});
-    const auto english = [](const std::vector<Words>& lines) {
-        Json list = Json::array();
-        for (const auto& w : lines) list.push_back(w.en);
-        return list;
-    };
     const auto maps = maps_for(st.base.scene, st.base.coarsest);
     Json j{{"title", st.base.scene.title},
            {"version", version_text()},
@@ -94,10 +111,10 @@ Json to_json(const State& st, const Answer& a)
            {"members_finished", finished},
            {"members_failed", failed},
            {"counted", a.counted.size()},
-           {"inputs", inputs_json},
+           {"inputs", json_of(inputs)},
            {"seed", st.base.uncertain.seed},
            {"group", st.group},
-           {"sensitivity", sensitivity},
+           {"sensitivity", sensitivity_of(a)},
            {"cell", maps.cell},
            {"wet", maps.wet},
            {"coarsest_spacing", st.base.coarsest},

@@ -77,72 +77,79 @@ std::string Record::text(const char* key) const
     return summary.contains(key) && summary[key].is_string() ? summary[key].get<std::string>() : std::string();
 }
 
-Record read_record(const io::Path& directory)
-{
-    // Held: nothing is read through links, which in a directory of another user may lead to any file of this one.
-    io::Place held;
-    try {
-        held = io::hold(directory);
-    } catch (const IoFailed&) { // not there, or no directory: said below
-    }
-    const auto place = [&](const std::string& name) {
-        const auto slash = name.find('/');
-        return slash == name.npos ? held / name : io::hold(held / name.substr(0, slash)) / name.substr(slash + 1);
-    };
-    const auto there = [&](const char* name) {
+namespace {
+
+/// Reads what there is of a directory, and tells what is missing. Held: nothing is read through links, which in a directory of another
+/// user may lead to any file of this one.
+class Reader {
+public:
+    Reader(const io::Path& directory, std::vector<std::string>& gaps) : gaps_(gaps)
+    {
         try {
-            return held.held() && io::exists(place(name));
+            held_ = io::hold(directory);
+        } catch (const IoFailed&) { // not there, or no directory: said later
+        }
+    }
+    bool there(const char* name) const
+    {
+        try {
+            return held_.held() && io::exists(place(name));
         } catch (const IoFailed&) {
             return false;
         }
-    };
-    if (!there("summary.json") && !there("scene.toml"))
-        throw BadInput(
-            fmt::format("{}: neither summary.json nor scene.toml here. Expected: the result directory of a run", directory.string()));
-    Record r;
-    r.directory = directory;
-    const auto text = [&](const char* name, const char* meaning, std::uint64_t most = 16 * MiB) -> std::string {
+    }
+    std::string text(const char* name, const char* meaning, std::uint64_t most = 16 * MiB)
+    {
         try {
             if (there(name)) return io::read_text(place(name), most);
-            r.gaps.push_back(fmt::format("{} is missing: {}.", name, meaning));
+            gaps_.push_back(fmt::format("{} is missing: {}.", name, meaning));
         } catch (const IoFailed& e) {
-            r.gaps.push_back(e.what());
+            gaps_.push_back(e.what());
         }
         return {};
-    };
-    const auto object = [&](const char* name, const char* meaning) {
+    }
+    nlohmann::json object(const char* name, const char* meaning)
+    {
         const std::string t = text(name, meaning);
         auto j = parse_json(t);
         if (j.is_object()) return j;
-        if (!t.empty()) r.gaps.push_back(fmt::format("{} is damaged: {}.", name, meaning));
+        if (!t.empty()) gaps_.push_back(fmt::format("{} is damaged: {}.", name, meaning));
         return nlohmann::json::object();
-    };
-    r.summary = object("summary.json", "the run goes on, or was killed before it could write its end");
-    r.timers = object("timers.json", "no times by phase");
-    r.history = read_table(text("history.csv", "no curves", 128 * MiB));
-    if (there("progress.csv")) r.progress = read_table(text("progress.csv", "no speed over time", 128 * MiB));
-    if (r.history.empty() && there("history.csv")) r.gaps.push_back("history.csv is damaged: no curves.");
-    r.scene = text("scene.toml", "the scene is unknown", MiB + 4096);
-    r.title = directory.filename().empty() ? directory.parent_path().filename().string() : directory.filename().string();
-    if (!r.scene.empty()) {
-        try {
-            const Scene s = io::parse_scene(r.scene, "scene.toml", {}, scene::StepLimit::Force);
-            if (!s.title.empty()) r.title = s.title;
-            r.end_time = s.time.end;
-            r.flat = s.dimensions == 2;
-        } catch (const BadInput&) {
-            r.gaps.push_back("scene.toml is not a scene of this version of kuzure.");
-        }
     }
+
+private:
+    io::Place place(const std::string& name) const
+    {
+        const auto slash = name.find('/');
+        return slash == name.npos ? held_ / name : io::hold(held_ / name.substr(0, slash)) / name.substr(slash + 1);
+    }
+    io::Place held_;
+    std::vector<std::string>& gaps_;
+};
+
+void read_scene(Record& r)
+{
+    try {
+        const Scene s = io::parse_scene(r.scene, "scene.toml", {}, scene::StepLimit::Force);
+        if (!s.title.empty()) r.title = s.title;
+        r.end_time = s.time.end;
+        r.flat = s.dimensions == 2;
+    } catch (const BadInput&) {
+        r.gaps.push_back("scene.toml is not a scene of this version of kuzure.");
+    }
+}
+
+void find_pictures(Record& r, Reader& from)
+{
     std::error_code error;
-    for (const auto& e : std::filesystem::directory_iterator(directory, error)) {
+    for (const auto& e : std::filesystem::directory_iterator(r.directory, error)) {
         if (io::picture_number(e.path()) && !e.is_symlink(error) && e.file_size(error) > 0) r.pictures.push_back(e.path());
     }
     std::sort(r.pictures.begin(), r.pictures.end());
     // Pictures carry the number of their snapshot, whose time the series tells.
     std::map<std::string, double> times;
-    if (there("snapshots/state.hdf.series")) {
-        const auto series = parse_json(text("snapshots/state.hdf.series", "times of pictures are unknown"));
+    if (from.there("snapshots/state.hdf.series")) {
+        const auto series = parse_json(from.text("snapshots/state.hdf.series", "times of pictures are unknown"));
         if (series.is_object() && series.contains("files") && series["files"].is_array())
             for (const auto& file : series["files"])
                 if (file.is_object() && file.contains("name") && file["name"].is_string() && file.contains("time") &&
@@ -153,8 +160,30 @@ Record read_record(const io::Path& directory)
         const auto at = times.find("state_" + p.stem().string().substr(8) + ".hdf");
         r.picture_times.push_back(at == times.end() ? std::nan("") : at->second);
     }
+}
+
+} // namespace
+
+Record read_record(const io::Path& directory)
+{
+    Record r;
+    Reader from(directory, r.gaps);
+    if (!from.there("summary.json") && !from.there("scene.toml"))
+        throw BadInput(
+            fmt::format("{}: neither summary.json nor scene.toml here. Expected: the result directory of a run", directory.string()));
+    r.directory = directory;
+    r.summary = from.object("summary.json", "the run goes on, or was killed before it could write its end");
+    r.timers = from.object("timers.json", "no times by phase");
+    r.history = read_table(from.text("history.csv", "no curves", 128 * MiB));
+    if (from.there("progress.csv")) r.progress = read_table(from.text("progress.csv", "no speed over time", 128 * MiB));
+    if (r.history.empty() && from.there("history.csv")) r.gaps.push_back("history.csv is damaged: no curves.");
+    r.scene = from.text("scene.toml", "the scene is unknown", MiB + 4096);
+    r.title = directory.filename().empty() ? directory.parent_path().filename().string() : directory.filename().string();
+    if (!r.scene.empty()) read_scene(r);
+    find_pictures(r, from);
+    std::error_code error;
     for (const char* name : {"movie.mp4", "movie.webm", "movie.gif"})
-        if (r.movie.empty() && there(name) && !std::filesystem::is_symlink(directory / name, error)) r.movie = directory / name;
+        if (r.movie.empty() && from.there(name) && !std::filesystem::is_symlink(directory / name, error)) r.movie = directory / name;
     return r;
 }
 

@@ -10,8 +10,8 @@
 namespace kuzure {
 
 /// Collective. The particles as read: as many as the scene has at this time, each id once, soils and activities that there are, every
-/// number of every field finite, densities above 0, positions inside the box. Throws IoFailed on all ranks, naming the file and what is
-/// wrong.
+/// number of every field finite, densities above 0, positions inside the box. Throws IoFailed on all ranks: the file, and
+/// what is wrong.
 void require_sound_state(const Comm&, const io::Checkpoint&, const Particles&, const Scene&, const scene::Filling&, const Clock&);
 
 /// Collective. Throws IoFailed where `now` has a field that was not among those read: it would be zeros.

@@ -48,8 +48,7 @@ public:
 private:
     pid_t pid_;
 };
-/// Runs this very program with other arguments, output into `log`, and waits. A StopRequest must live. Throws IoFailed where it cannot be
-/// started.
+/// Runs this very program with other arguments, output into `log`, and waits. A StopRequest must live. Throws IoFailed.
 ChildResult run_child(const std::vector<std::string>& arguments, const io::Path& log);
 
 } // namespace kuzure::study

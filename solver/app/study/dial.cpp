@@ -3,6 +3,7 @@
 #include "io/scene_keys.hpp"
 #include "solver/app/scaling/forecast.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/kernels/pair_model.hpp"
 #include "solver/scene/fill.hpp"
 #include <algorithm>
 #include <charconv>
@@ -231,6 +232,20 @@ double parse_accuracy(const std::string& text)
         throw BadInput(
             fmt::format("--accuracy: expected an error from 0.1 % to 50 %, found \"{}\"; write, for example, --accuracy 5%", text));
     return x;
+}
+
+Exit print_proposal(const Comm& comm, const Scene& s, const std::string& accuracy, bool json)
+{
+    const double wanted = parse_accuracy(accuracy);
+    use_threads(comm, 0);
+    const auto estimate_of = [](const scene::CheckedScene& r) {
+        return estimate(r.scene, r.filling, *choose_model(r.scene, Arithmetic::Simd));
+    };
+    const auto proposal = propose(s, wanted, measured(), [&](const scene::CheckedScene& r) { return work(estimate_of(r)); });
+    const auto& r = *proposal.checked;
+    const double seconds = forecast(comm, r.scene, r.filling, estimate_of(r)).seconds;
+    if (comm.rank() == 0) fmt::print("{}", json ? to_json(proposal, wanted, seconds).dump(2) + "\n" : to_text(proposal, wanted, seconds));
+    return Exit::Ok;
 }
 
 } // namespace kuzure::study

@@ -1,5 +1,6 @@
 #pragma once
 // From a wanted error to settings: read off the table of measured studies (measured.inl, made by jobs/studies/publish.py).
+#include "solver/app/cli/command.hpp"
 #include "solver/scene/check.hpp"
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
@@ -63,5 +64,8 @@ nlohmann::ordered_json to_json(const Proposal&, double wanted, double seconds);
 
 /// "5%", "5 %" or "0.05" as 0.05. Throws BadInput.
 double parse_accuracy(const std::string&);
+
+/// kuzure check --accuracy: settings for this error, with time and expected error, on the root's terminal. Collective.
+Exit print_proposal(const Comm&, const Scene&, const std::string& accuracy, bool json);
 
 } // namespace kuzure::study

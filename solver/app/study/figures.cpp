@@ -34,6 +34,28 @@ std::string both(const std::string& name, int width, int height, const std::stri
     return out;
 }
 
+/// One plot of error against cost.
+std::string cost_plots(const Study& study, Measure m, const std::string& name, const std::vector<std::string>& curves, bool work)
+{
+    const double scatter = 100 * study.sweep.reference.scatter;
+    std::string plots;
+    const auto add = [&](const std::string& one) { plots += (plots.empty() ? "plot " : ", \\\n  ") + one; };
+    if (scatter > 0) add(fmt::format("{:.4g} w filledcurves y1=1e-9 fc rgb '#eeeeee' t 'scatter of the experiment'", scatter));
+    add(fmt::format("'{}.dat' index {} u 1:2 w l lw 7 lc rgb '#ffe08a' t 'Pareto front'", name, curves.size() + std::size_t(work)));
+    add("5 w l dt 3 lc rgb '#999999' notitle"), add("1 w l dt 3 lc rgb '#999999' notitle");
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+        std::string title = curves[i];
+        if (!work)
+            for (const auto& [level, text] : {std::pair{0.05, "5 %"}, std::pair{0.01, "1 %"}})
+                if (const auto t = cost_at(study.prices(curves[i], m, false), level)) title += fmt::format(", {} in {:.3g} s", text, *t);
+        add(fmt::format("'{}.dat' index {} u {}:3 w lp lw 2 pt 7 ps 0.8 lc rgb '{}' t {}", name, i, work ? 2 : 1, colours[i % 8],
+                        io::gnuplot_string(title)));
+    }
+    add(fmt::format("'{}.dat' index 0 u {}:3:(sprintf('%g m', $4)) w labels offset 0,0.8 font ',8' textcolor rgb '#404040' notitle", name,
+                    work ? 2 : 1));
+    return plots + "\n";
+}
+
 /// Error against cost, once by core-seconds and once by work.
 std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
 {
@@ -70,30 +92,12 @@ std::string cost_figure(const Study& study, Measure m, const io::Path& folder)
                     "(%)'\nset yrange [{:.3g}:{:.3g}]\n",
                     io::gnuplot_string(fmt::format("{}: {}", study.sweep.title, io::measure_names()[k])), io::measure_names()[k],
                     0.5 * std::min(least, 1.0), 2 * std::max(most, 5.0));
-    const double scatter = 100 * study.sweep.reference.scatter;
     for (const bool work : {false, true}) {
         c += fmt::format("set xlabel '{}'\n", work ? "work (pairs of the one-pass scheme)" : "core-seconds");
         c += work ? "unset key\n" : "set key at graph 0,-0.17 left top Left reverse samplen 1.5 spacing 1.1 font ',9' maxcols 1\n";
         if (!work) c += "set format x '%g'\n";
         else c += "set format x '%.0e'\n";
-        std::string plots;
-        const auto add = [&](const std::string& one) { plots += (plots.empty() ? "plot " : ", \\\n  ") + one; };
-        if (scatter > 0) add(fmt::format("{:.4g} w filledcurves y1=1e-9 fc rgb '#eeeeee' t 'scatter of the experiment'", scatter));
-        add(fmt::format("'{}.dat' index {} u 1:2 w l lw 7 lc rgb '#ffe08a' t 'Pareto front'", name, curves.size() + std::size_t(work)));
-        add("5 w l dt 3 lc rgb '#999999' notitle"), add("1 w l dt 3 lc rgb '#999999' notitle");
-        std::string labels;
-        for (std::size_t i = 0; i < curves.size(); ++i) {
-            std::string title = curves[i];
-            if (!work)
-                for (const auto& [level, text] : {std::pair{0.05, "5 %"}, std::pair{0.01, "1 %"}})
-                    if (const auto t = cost_at(study.prices(curves[i], m, false), level))
-                        title += fmt::format(", {} in {:.3g} s", text, *t);
-            add(fmt::format("'{}.dat' index {} u {}:3 w lp lw 2 pt 7 ps 0.8 lc rgb '{}' t {}", name, i, work ? 2 : 1, colours[i % 8],
-                            io::gnuplot_string(title)));
-        }
-        add(fmt::format("'{}.dat' index 0 u {}:3:(sprintf('%g m', $4)) w labels offset 0,0.8 font ',8' textcolor rgb '#404040' notitle",
-                        name, work ? 2 : 1));
-        c += plots + "\n";
+        c += cost_plots(study, m, name, curves, work);
     }
     c += "unset multiplot\n";
     return both(name, 1100, 580, c);

@@ -8,102 +8,124 @@
 
 namespace kuzure::study {
 
+namespace {
+
+using Json = nlohmann::ordered_json;
+const std::string& name_of(io::Measure m) { return io::measure_names()[std::size_t(m)]; }
+
+/// In the dial's own units: its table of measured curves is made of this.
+Json about(const Scene& scene, double spacing)
+{
+    const Likeness l = likeness(scene);
+    return {{"dimensions", l.dimensions},
+            {"height", l.layers * spacing},
+            {"slenderness", l.slenderness},
+            {"friction_angle", l.friction_angle},
+            {"cohesion", l.cohesion}};
+}
+
+Json json_of(const Study& study, const Point& p)
+{
+    const Point* base = study.base();
+    Json row{{"curve", p.asked.curve}, {"choice", p.asked.choice}, {"settings", p.asked.sets},
+             {"folder", p.folder},     {"scene_hash", p.hash},     {"exit_code", p.exit_code}};
+    if (!p.message.empty()) row["message"] = p.message;
+    if (p.scene) {
+        Json scene{{"spacing", p.spacing}, {"base_strain", p.base_strain}, {"mach", p.mach}};
+        row.update(scene);
+    }
+    if (p.finished()) {
+        row.update(Json{{"particles", p.particles},
+                        {"steps", p.steps},
+                        {"pairs", p.pairs},
+                        {"work", p.work},
+                        {"core_seconds", p.core_seconds},
+                        {"wall_seconds", p.wall_seconds}});
+        row["values"] = Json::object(), row["errors"] = Json::object();
+        for (const auto m : study.sweep.measures) {
+            row["values"][name_of(m)] = p.value[std::size_t(m)];
+            row["errors"][name_of(m)] = p.error[std::size_t(m)];
+        }
+        if (base && p.asked.choice && &p != base) {
+            row["against_base"] = {{"core_seconds", p.core_seconds / base->core_seconds}, {"work", p.work / base->work}};
+            for (const auto m : study.sweep.measures)
+                row["against_base"][name_of(m)] = p.error[std::size_t(m)] - base->error[std::size_t(m)];
+        }
+    }
+    return row;
+}
+
+/// What a curve costs for an error of 5 and 1 %, and how it converges.
+Json json_of(const Study& study, const std::string& curve)
+{
+    Json c{{"curve", curve}};
+    for (const auto m : study.sweep.measures) {
+        Json entry;
+        for (const auto& [percent, label] : {std::pair{0.05, "core_seconds_to_5_percent"}, std::pair{0.01, "core_seconds_to_1_percent"}}) {
+            const auto t = cost_at(study.prices(curve, m, false), percent);
+            entry[label] = t ? Json(*t) : Json();
+        }
+        for (const auto& conv : study.convergence)
+            if (conv.curve == curve && conv.measure == m) {
+                entry["order"] = conv.result.order ? Json(*conv.result.order) : Json();
+                if (conv.result.order) entry["limit"] = conv.result.limit, entry["half_width"] = conv.result.half_width;
+                else entry["no_extrapolation"] = conv.result.why_not;
+            }
+        c[name_of(m)] = entry;
+    }
+    return c;
+}
+
+/// The points that no other beats in cost and error.
+Json front_of(const Study& study, io::Measure m)
+{
+    std::vector<Price> all;
+    std::vector<const Point*> who;
+    for (const auto& p : study.points)
+        if (p.finished() && study.tells(p, m)) all.push_back({p.core_seconds, p.error[std::size_t(m)]}), who.push_back(&p);
+    Json front = Json::array();
+    for (const auto i : pareto_front(all))
+        front.push_back(
+            {{"curve", who[i]->asked.curve}, {"spacing", who[i]->spacing}, {"core_seconds", all[i].cost}, {"error", all[i].error}});
+    return front;
+}
+
+Json json_of(const ErrorBar& b)
+{
+    Json row{{"curve", b.curve}, {"measure", name_of(b.measure)}, {"spacing", b.spacing}, {"value", b.value}, {"truth", b.truth}};
+    if (b.why_not.empty())
+        row["half_width"] = b.half_width, row["covers"] = b.covers(),
+        row["half_width_over_error"] = b.half_width / std::fabs(b.value - b.truth);
+    else row["no_interval"] = b.why_not;
+    return row;
+}
+
+} // namespace
+
 nlohmann::ordered_json to_json(const Study& study)
 {
-    using Json = nlohmann::ordered_json;
-    const auto& names = io::measure_names();
     Json j;
     j["title"] = study.sweep.title;
     j["scene"] = study.sweep.scene.filename().string();
     j["window"] = study.window, j["grain"] = study.grain;
     for (const auto& p : study.points)
-        if (p.scene) { // in the dial's own units: its table of measured curves is made of this
-            const Likeness l = likeness(*p.scene);
-            j["about"] = {{"dimensions", l.dimensions},
-                          {"height", l.layers * p.spacing},
-                          {"slenderness", l.slenderness},
-                          {"friction_angle", l.friction_angle},
-                          {"cohesion", l.cohesion}};
+        if (p.scene) {
+            j["about"] = about(*p.scene, p.spacing);
             break;
         }
     j["measures"] = Json::object();
     for (const auto m : study.sweep.measures)
-        j["measures"][names[std::size_t(m)]] = {{"reference", study.reference[std::size_t(m)]},
-                                                {"from", study.reference_note[std::size_t(m)]},
-                                                {"spacing", study.reference_spacing[std::size_t(m)]}};
+        j["measures"][name_of(m)] = {{"reference", study.reference[std::size_t(m)]},
+                                     {"from", study.reference_note[std::size_t(m)]},
+                                     {"spacing", study.reference_spacing[std::size_t(m)]}};
     j["scatter"] = study.sweep.reference.scatter;
-    const Point* base = study.base();
-    j["points"] = Json::array();
-    for (const auto& p : study.points) {
-        Json row{{"curve", p.asked.curve}, {"choice", p.asked.choice}, {"settings", p.asked.sets},
-                 {"folder", p.folder},     {"scene_hash", p.hash},     {"exit_code", p.exit_code}};
-        if (!p.message.empty()) row["message"] = p.message;
-        if (p.scene) {
-            Json scene{{"spacing", p.spacing}, {"base_strain", p.base_strain}, {"mach", p.mach}};
-            row.update(scene);
-        }
-        if (p.finished()) {
-            row.update(Json{{"particles", p.particles},
-                            {"steps", p.steps},
-                            {"pairs", p.pairs},
-                            {"work", p.work},
-                            {"core_seconds", p.core_seconds},
-                            {"wall_seconds", p.wall_seconds}});
-            row["values"] = Json::object(), row["errors"] = Json::object();
-            for (const auto m : study.sweep.measures) {
-                row["values"][names[std::size_t(m)]] = p.value[std::size_t(m)];
-                row["errors"][names[std::size_t(m)]] = p.error[std::size_t(m)];
-            }
-            if (base && p.asked.choice && &p != base) {
-                row["against_base"] = {{"core_seconds", p.core_seconds / base->core_seconds}, {"work", p.work / base->work}};
-                for (const auto m : study.sweep.measures)
-                    row["against_base"][names[std::size_t(m)]] = p.error[std::size_t(m)] - base->error[std::size_t(m)];
-            }
-        }
-        j["points"].push_back(std::move(row));
-    }
-    j["curves"] = Json::array();
-    for (const auto& curve : study.curves()) {
-        Json c{{"curve", curve}};
-        for (const auto m : study.sweep.measures) {
-            Json entry;
-            for (const auto& [percent, label] :
-                 {std::pair{0.05, "core_seconds_to_5_percent"}, std::pair{0.01, "core_seconds_to_1_percent"}}) {
-                const auto t = cost_at(study.prices(curve, m, false), percent);
-                entry[label] = t ? Json(*t) : Json();
-            }
-            for (const auto& conv : study.convergence)
-                if (conv.curve == curve && conv.measure == m) {
-                    entry["order"] = conv.result.order ? Json(*conv.result.order) : Json();
-                    if (conv.result.order) entry["limit"] = conv.result.limit, entry["half_width"] = conv.result.half_width;
-                    else entry["no_extrapolation"] = conv.result.why_not;
-                }
-            c[names[std::size_t(m)]] = entry;
-        }
-        j["curves"].push_back(std::move(c));
-    }
+    j["points"] = Json::array(), j["curves"] = Json::array();
+    for (const auto& p : study.points) j["points"].push_back(json_of(study, p));
+    for (const auto& curve : study.curves()) j["curves"].push_back(json_of(study, curve));
     j["pareto"] = Json::object();
-    for (const auto m : study.sweep.measures) {
-        std::vector<Price> all;
-        std::vector<const Point*> who;
-        for (const auto& p : study.points)
-            if (p.finished() && study.tells(p, m)) all.push_back({p.core_seconds, p.error[std::size_t(m)]}), who.push_back(&p);
-        Json front = Json::array();
-        for (const auto i : pareto_front(all))
-            front.push_back(
-                {{"curve", who[i]->asked.curve}, {"spacing", who[i]->spacing}, {"core_seconds", all[i].cost}, {"error", all[i].error}});
-        j["pareto"][names[std::size_t(m)]] = front;
-    }
+    for (const auto m : study.sweep.measures) j["pareto"][name_of(m)] = front_of(study, m);
     j["error_bars"] = Json::array();
-    for (const auto& b : study.bars) {
-        Json row{
-            {"curve", b.curve}, {"measure", names[std::size_t(b.measure)]}, {"spacing", b.spacing}, {"value", b.value}, {"truth", b.truth}};
-        if (b.why_not.empty())
-            row["half_width"] = b.half_width, row["covers"] = b.covers(),
-            row["half_width_over_error"] = b.half_width / std::fabs(b.value - b.truth);
-        else row["no_interval"] = b.why_not;
-        j["error_bars"].push_back(std::move(row));
-    }
+    for (const auto& b : study.bars) j["error_bars"].push_back(json_of(b));
     return j;
 }
 

@@ -46,6 +46,27 @@ public:
                            "run its threads");
         const std::string text = io::read_scene_text(args_.sweep);
         study_ = plan(io::parse_sweep(text, args_.sweep));
+        open_directory(text);
+        threads_ = args_.threads > 0 ? args_.threads : study_.sweep.threads;
+        if (!run_all(to_run())) {
+            say("stopped on request; the same command goes on from here");
+            return Exit::Stopped;
+        }
+        measure_all();
+        compare(study_);
+        const auto problems = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return !p.finished(); });
+        io::write_atomically(out_ / "study.json", to_json(study_).dump(1) + "\n");
+        io::write_atomically(out_ / "study.csv", to_csv(study_));
+        say("\n" + to_text(study_));
+        say(draw(study_, out_ / "figures"));
+        say(fmt::format("{}; {} of {} points without result; results in {}", problems ? "done" : "all points done", problems,
+                        study_.points.size(), out_.string()));
+        return Exit::Ok;
+    }
+
+private:
+    void open_directory(const std::string& text)
+    {
         if (std::filesystem::exists(out_) && !std::filesystem::is_directory(out_))
             throw BadInput(fmt::format("{}: expected a directory, found a file; choose another with -o DIR", out_.string()));
         std::error_code error;
@@ -57,9 +78,11 @@ public:
                 out_.string()));
         std::filesystem::create_directories(out_ / "points", error);
         io::write_atomically(out_ / "sweep.toml", text);
-        const int threads = args_.threads > 0 ? args_.threads : study_.sweep.threads;
+    }
 
-        // The cheap ones first: they show early what is wrong, and teach what the others will take.
+    /// The points that are not there yet. The cheap ones first: they show early what is wrong, and teach what the others will take.
+    std::vector<Point*> to_run()
+    {
         std::vector<Point*> todo;
         for (auto& p : study_.points) {
             if (!p.scene) continue;
@@ -68,17 +91,18 @@ public:
         std::stable_sort(todo.begin(), todo.end(), [](const auto* a, const auto* b) { return a->predicted_work < b->predicted_work; });
         const auto done = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return p.resumed; });
         say(fmt::format("{}: {} points, {} already there, {} to run, {} thread{} each", study_.sweep.title, study_.points.size(), done,
-                        todo.size(), threads, threads > 1 ? "s" : ""));
-        double work_left = 0, work_done = 0, seconds_done = 0;
-        for (const auto* p : todo) work_left += p->predicted_work;
+                        todo.size(), threads_, threads_ > 1 ? "s" : ""));
+        return todo;
+    }
+
+    /// False if this program was asked to stop.
+    bool run_all(const std::vector<Point*>& todo)
+    {
+        for (const auto* p : todo) work_left_ += p->predicted_work;
         const auto begin = std::chrono::steady_clock::now();
-        std::optional<StopRequest> stop(std::in_place); // for as long as points are run
-        const auto stopped = [&] {
-            say("stopped on request; the same command goes on from here");
-            return Exit::Stopped;
-        };
+        const StopRequest stop; // for as long as points are run
         for (std::size_t k = 0; k < todo.size(); ++k) {
-            if (stop->came()) return stopped();
+            if (stop.came()) return false;
             Point& p = *todo[k];
             if (args_.max_minutes > 0 && std::chrono::steady_clock::now() - begin > std::chrono::duration<double>(60 * args_.max_minutes)) {
                 p.message = "not run yet: --max-minutes are over; the same command goes on";
@@ -86,24 +110,27 @@ public:
             }
             const std::string head = fmt::format("[{}/{}] {}, {:g} m", k + 1, todo.size(), p.asked.curve, p.spacing);
             // Another point of the same scene may have been run meanwhile.
-            if (take_what_is_there(folder(p), p)) {
-                say(head + ": the same scene as a point before");
-            } else if (!run(p, threads)) {
-                return stopped();
-            } else {
-                work_done += p.predicted_work, seconds_done += p.core_seconds;
-                const double left = work_done > 0 ? seconds_done / work_done * (work_left - p.predicted_work) / threads : 0;
-                say(fmt::format("{}: {}{}", head,
-                                p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds)
-                                                 : fmt::format("exit {}: {}", p.exit_code, p.message),
-                                k + 1 < todo.size() ? left < 100 ? fmt::format("; about {:.0f} s left", left)
-                                                                 : fmt::format("; about {:.1f} minutes left", left / 60)
-                                                    : ""));
-            }
-            work_left -= p.predicted_work;
+            if (take_what_is_there(folder(p), p)) say(head + ": the same scene as a point before");
+            else if (!run(p, threads_)) return false;
+            else tell(head, p, k + 1 == todo.size());
+            work_left_ -= p.predicted_work;
         }
-        stop.reset();
+        return true;
+    }
+    void tell(const std::string& head, const Point& p, bool last)
+    {
+        work_done_ += p.predicted_work, seconds_done_ += p.core_seconds;
+        const double left = work_done_ > 0 ? seconds_done_ / work_done_ * (work_left_ - p.predicted_work) / threads_ : 0;
+        const std::string how =
+            p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds) : fmt::format("exit {}: {}", p.exit_code, p.message);
+        const std::string rest = last         ? ""
+                                 : left < 100 ? fmt::format("; about {:.0f} s left", left)
+                                              : fmt::format("; about {:.1f} minutes left", left / 60);
+        say(head + ": " + how + rest);
+    }
 
+    void measure_all()
+    {
         for (auto& p : study_.points) {
             if (!p.finished()) continue;
             const auto damaged = [&](const std::exception& e) {
@@ -119,18 +146,8 @@ public:
                 throw damaged(e);
             }
         }
-        compare(study_);
-        const auto problems = std::count_if(study_.points.begin(), study_.points.end(), [](const auto& p) { return !p.finished(); });
-        io::write_atomically(out_ / "study.json", to_json(study_).dump(1) + "\n");
-        io::write_atomically(out_ / "study.csv", to_csv(study_));
-        say("\n" + to_text(study_));
-        say(draw(study_, out_ / "figures"));
-        say(fmt::format("{}; {} of {} points without result; results in {}", problems ? "done" : "all points done", problems,
-                        study_.points.size(), out_.string()));
-        return Exit::Ok;
     }
 
-private:
     io::Path folder(const Point& p) const { return out_ / "points" / p.folder; }
 
     /// False if this program was asked to stop.
@@ -168,6 +185,8 @@ private:
     StudyArguments args_;
     io::Path out_;
     Study study_;
+    int threads_ = 1;
+    double work_left_ = 0, work_done_ = 0, seconds_done_ = 0; // of the points to run: pairs, core-seconds
 };
 
 } // namespace
