@@ -16,7 +16,7 @@ endif()
 # ---- what the program reads, and what people read ------------------------------------------------------------------------
 foreach(folder machines scenes studies scaling paraview)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/jobs/${folder})
-    install(DIRECTORY jobs/${folder} DESTINATION share/kuzure COMPONENT data)
+    install(DIRECTORY jobs/${folder} DESTINATION share/kuzure COMPONENT data USE_SOURCE_PERMISSIONS)
   endif()
 endforeach()
 # The Python package: found by Debian's python3 under /usr, elsewhere by PYTHONPATH or, better, pip install ./python.
@@ -44,9 +44,28 @@ install(CODE [[
       set(file "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/${where}")
       message(STATUS "Installing: ${file}")
       file(WRITE "${file}" "${text}")
+      if(what STREQUAL "man")
+        execute_process(COMMAND gzip -9nf "${file}") # man reads both
+      endif()
     endif()
   endforeach()
 ]] COMPONENT data)
+# What Debian asks of a package: its own changelog, and why some of its rules are not kept.
+if(KUZURE_ISA)
+  install(CODE "set(version ${PROJECT_VERSION})" COMPONENT data)
+  install(CODE [[
+    set(root "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/share")
+    file(WRITE "${root}/doc/kuzure/changelog" "kuzure (${version}) unstable; urgency=low\n\n  * See CHANGELOG.md.\n\n -- the kuzure developers <kuzure@localhost>  Thu, 01 Jan 2026 00:00:00 +0000\n")
+    execute_process(COMMAND gzip -9nf "${root}/doc/kuzure/changelog")
+    file(WRITE "${root}/lintian/overrides/kuzure" "# Batch templates are filled in, not run.
+kuzure: script-not-executable [usr/share/kuzure/machines/*]
+# ParaView's own.
+kuzure: unusual-interpreter /usr/bin/pvbatch *
+# There is no address yet.
+kuzure: bogus-mail-host *
+")
+  ]] COMPONENT data)
+endif()
 
 # ---- the solver library ------------------------------------------------------------------------------------------------
 foreach(name flags scene solver)
@@ -69,14 +88,14 @@ install(FILES ${PROJECT_BINARY_DIR}/kuzureConfig.cmake ${PROJECT_BINARY_DIR}/kuz
 set(CPACK_PACKAGE_NAME kuzure)
 set(CPACK_PACKAGE_CONTACT "the kuzure developers <kuzure@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "collapse of soil masses by smoothed particle hydrodynamics")
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Simulates the failure of soil in three dimensions: elasto-plastic Drucker-Prager soil,
-smoothed particle hydrodynamics, MPI ranks with OpenMP threads inside. The same
-bits for any number of ranks and threads. Holds the program for x86-64, AVX2
-and AVX-512 processors; the best is chosen at start.")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Simulates the failure of soil in three dimensions: elasto-plastic
+Drucker-Prager soil, smoothed particle hydrodynamics, MPI ranks with OpenMP
+threads inside. The same bits for any number of ranks and threads. Holds the
+program for x86-64, AVX2 and AVX-512 processors; the best is chosen at start.")
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin) # a program without mpirun starts its daemon, too
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "openmpi-bin, python3:any") # a program without mpirun starts its daemon, too; the Python package
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3-h5py, python3-numpy, fonts-ipafont-gothic | fonts-noto-cjk") # the Python package; Japanese titles of pictures
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "paraview, ffmpeg, python3-matplotlib, python3-pandas")
 set(CPACK_STRIP_FILES ON)

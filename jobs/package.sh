@@ -44,9 +44,15 @@ fakeroot cpack -G DEB --config "$base/CPackConfig.cmake" -B "$PWD/$out" -D CPACK
 }
 deb=$(ls "$out"/*.deb)
 contents=$(dpkg -c "$deb")
-for file in bin/kuzure share/kuzure/machines/slurm.toml share/kuzure/scenes/bank.toml lib/python3/dist-packages/kuzure/results.py share/man/man1/kuzure.1 share/bash-completion/completions/kuzure \
+for file in bin/kuzure share/kuzure/machines/slurm.toml share/kuzure/scenes/bank.toml lib/python3/dist-packages/kuzure/results.py share/man/man1/kuzure.1.gz share/doc/kuzure/changelog.gz share/bash-completion/completions/kuzure \
     "${isas[@]/%//kuzure}"; do
     grep -qE " \./usr/(lib/kuzure/)?$file( |$)" <<<"$contents" || fail "$deb has no $file; see $PWD/build/package.log"
 done
+if command -v lintian >/dev/null; then
+    lintian --fail-on error,warning "$deb" >build/lintian.log 2>&1 || {
+        cat build/lintian.log >&2
+        fail "lintian finds fault with $deb; what is not meant to be mended is in the overrides of cmake/Install.cmake"
+    }
+fi
 dpkg -f "$deb" Package Version Architecture Installed-Size Depends Suggests
 echo "made $deb ($(du -h "$deb" | cut -f1)); to install it: apt-get install ./$deb"

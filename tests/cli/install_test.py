@@ -75,7 +75,7 @@ def main():
             "share/bash-completion/completions/kuzure",
             "share/zsh/site-functions/_kuzure",
             "share/fish/vendor_completions.d/kuzure.fish",
-            "share/man/man1/kuzure.1",
+            "share/man/man1/kuzure.1.gz",
         ):
             need((prefix / file).is_file() and (prefix / file).stat().st_size > 100, f"{file} was not installed")
         need(run(program, "--version") == run(PROGRAM, "--version"), "--version of the installed program")
