@@ -387,6 +387,40 @@ template <class A> void describe_soil_change(A& a, const std::string& path, scen
              {.unit = "1", .range = above_to(0, 1e6), .example = "0.5", .doc = "factor of Young's modulus"});
 }
 
+template <class A> void describe_move(A& a, const std::string& p, scene::WallMove& m)
+{
+    a.text(p + ".wall", m.wall, {.example = "\"gate\"", .doc = "name of the wall"});
+    a.vector(p + ".velocity", m.velocity,
+             {.unit = "m/s",
+              .range = between(-1e6, 1e6),
+              .fallback = "[0.0, 0.0, 0.0]",
+              .example = "[0.0, 0.0, 1.5]",
+              .doc = "velocity, of the center where it turns too"});
+    a.table(p + ".rotation", m.turn, {.example = "{ center = [1.0, 0.0, 0.0], rate = 2.0 }", .doc = "the wall turns as well"},
+            [&](const std::string& q, scene::Turn& t) {
+                a.vector(
+                    q + ".center", t.center,
+                    {.unit = "m", .range = coordinate, .example = "[1.0, 0.0, 0.0]", .doc = "a point of the axis when the motion begins"});
+                a.vector(q + ".axis", t.axis,
+                         {.unit = "1",
+                          .range = between(-1e6, 1e6),
+                          .fallback = "[0.0, 1.0, 0.0]",
+                          .example = "[0.0, 1.0, 0.0]",
+                          .doc = "direction of the axis; a right-handed turn about it is positive"});
+                a.angle(q + ".rate", t.rate, {.unit = "deg/s", .range = between(-1e6, 1e6), .example = "2.0", .doc = "how fast it turns"});
+            });
+}
+
+template <class A> void describe_probe(A& a, const std::string& path, scene::Probe& p)
+{
+    a.text(path + ".name", p.name, {.optional = true, .example = "\"toe\"", .doc = "what the rows are called; without it its number"});
+    a.vector(path + ".point", p.point,
+             {.unit = "m", .range = coordinate, .example = "[1.0, 0.0, 0.5]", .doc = "a place: what the soil around it is"});
+    a.integer(path + ".particle", p.particle, {.range = between(0, 2147483647), .example = "1200", .doc = "a particle of soil by its id"});
+    a.text(path + ".body", p.body,
+           {.optional = true, .example = "\"block\"", .doc = "the name of a body: the mean of its particles by mass"});
+}
+
 template <class A> void describe_events(A& a, Scene& s)
 {
     a.tables(
@@ -425,32 +459,7 @@ template <class A> void describe_events(A& a, Scene& s)
                       .doc = "damping as effects.damping, from then on; 0: none"});
             a.table(path + ".move", e.move,
                     {.example = "{ wall = \"gate\", velocity = [0.0, 0.0, 1.5] }", .doc = "a wall that moves, from from to to"},
-                    [&](const std::string& p, scene::WallMove& m) {
-                        a.text(p + ".wall", m.wall, {.example = "\"gate\"", .doc = "name of the wall"});
-                        a.vector(p + ".velocity", m.velocity,
-                                 {.unit = "m/s",
-                                  .range = between(-1e6, 1e6),
-                                  .fallback = "[0.0, 0.0, 0.0]",
-                                  .example = "[0.0, 0.0, 1.5]",
-                                  .doc = "velocity, of the center where it turns too"});
-                        a.table(p + ".rotation", m.turn,
-                                {.example = "{ center = [1.0, 0.0, 0.0], rate = 2.0 }", .doc = "the wall turns as well"},
-                                [&](const std::string& q, scene::Turn& t) {
-                                    a.vector(q + ".center", t.center,
-                                             {.unit = "m",
-                                              .range = coordinate,
-                                              .example = "[1.0, 0.0, 0.0]",
-                                              .doc = "a point of the axis when the motion begins"});
-                                    a.vector(q + ".axis", t.axis,
-                                             {.unit = "1",
-                                              .range = between(-1e6, 1e6),
-                                              .fallback = "[0.0, 1.0, 0.0]",
-                                              .example = "[0.0, 1.0, 0.0]",
-                                              .doc = "direction of the axis; a right-handed turn about it is positive"});
-                                    a.angle(q + ".rate", t.rate,
-                                            {.unit = "deg/s", .range = between(-1e6, 1e6), .example = "2.0", .doc = "how fast it turns"});
-                                });
-                    });
+                    [&](const std::string& p, scene::WallMove& m) { describe_move(a, p, m); });
             a.soil_changes(path + ".soil", e.soils, s.soils,
                            {.optional = true, .example = "[event.soil.sand]", .doc = "what a soil becomes; only what is written changes"},
                            [&](const std::string& p, scene::SoilChange& soil) { describe_soil_change(a, p, soil); });
@@ -460,16 +469,7 @@ template <class A> void describe_events(A& a, Scene& s)
               .example = "[[probe]]",
               .doc = "a row a time of output.history in probes.csv: of a place, a particle or the mean of a body (docs/stages.md)",
               .role = Role::Bookkeeping},
-             [&](const std::string& path, scene::Probe& p) {
-                 a.text(path + ".name", p.name,
-                        {.optional = true, .example = "\"toe\"", .doc = "what the rows are called; without it its number"});
-                 a.vector(path + ".point", p.point,
-                          {.unit = "m", .range = coordinate, .example = "[1.0, 0.0, 0.5]", .doc = "a place: what the soil around it is"});
-                 a.integer(path + ".particle", p.particle,
-                           {.range = between(0, 2147483647), .example = "1200", .doc = "a particle of soil by its id"});
-                 a.text(path + ".body", p.body,
-                        {.optional = true, .example = "\"block\"", .doc = "the name of a body: the mean of its particles by mass"});
-             });
+             [&](const std::string& path, scene::Probe& p) { describe_probe(a, path, p); });
 }
 
 template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)

@@ -79,6 +79,25 @@ void check_names(const Scene& s, Issues& issues)
     }
 }
 
+void check_soil_changes(const Scene& s, const Event& e, const std::string& key, Issues& issues)
+{
+    const auto error = [&](const std::string& where, std::string text) {
+        issues.push_back({Severity::Error, key + "." + where, std::move(text), {}});
+    };
+    const bool slowly = e.from.has_value();
+    for (const auto& c : e.soils) {
+        const bool known = c.soil >= 0 && std::size_t(c.soil) < s.soils.size();
+        if (!known) continue; // the reader has said so
+        const std::string soil = "soil." + s.soils[std::size_t(c.soil)].name;
+        if (c.stiffness && c.young) error(soil, "expected young or stiffness, found both; leave one");
+        if (c.strength && (c.cohesion || c.friction_angle || c.tension_cutoff || c.dilation_angle))
+            error(soil, "expected strength or its parts, found both; leave one");
+        if (slowly && c.cone) error(soil + ".cone", "expected at = ... for a cone, which changes at once, found from and to");
+        if (slowly && c.tension_cutoff && !s.soils[std::size_t(c.soil)].tension_cutoff)
+            error(soil + ".tension_cutoff", "expected a soil with a tension_cutoff to start from, found none; give it one, or at = ...");
+    }
+}
+
 /// What an event says of itself.
 void check_event(const Scene& s, const Event& e, const std::string& key, Issues& issues)
 {
@@ -130,17 +149,7 @@ void check_event(const Scene& s, const Event& e, const std::string& key, Issues&
     check_move(s, e, key, issues);
     if (e.shaking.rows && s.effects.pore_pressure)
         error("shaking", "expected no pore water where the ground shakes: water that does not flow has no answer to it; leave one out");
-    for (const auto& c : e.soils) {
-        const bool known = c.soil >= 0 && std::size_t(c.soil) < s.soils.size();
-        if (!known) continue; // the reader has said so
-        const std::string soil = "soil." + s.soils[std::size_t(c.soil)].name;
-        if (c.stiffness && c.young) error(soil, "expected young or stiffness, found both; leave one");
-        if (c.strength && (c.cohesion || c.friction_angle || c.tension_cutoff || c.dilation_angle))
-            error(soil, "expected strength or its parts, found both; leave one");
-        if (slowly && c.cone) error(soil + ".cone", "expected at = ... for a cone, which changes at once, found from and to");
-        if (slowly && c.tension_cutoff && !s.soils[std::size_t(c.soil)].tension_cutoff)
-            error(soil + ".tension_cutoff", "expected a soil with a tension_cutoff to start from, found none; give it one, or at = ...");
-    }
+    check_soil_changes(s, e, key, issues);
 }
 
 /// What events say of each other.

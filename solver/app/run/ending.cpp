@@ -79,8 +79,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     if (sim.filling().wall_count() > 0 && scene::walls_change(scene_)) j["walls_in"] = {"snapshots/state_*.hdf"};
     else if (sim.filling().wall_count() > 0) j["walls_in"] = {"snapshots/state_000000.hdf", "snapshots/walls.hdf"};
     j["rebuilds"] = sim.rebuilds();
-    j["repartitions"] = sim.balance().cuts();
-    j["repartitions_by_metis"] = sim.balance().full_partitions();
+    j["repartitions"] = sim.balance().cuts(), j["repartitions_by_metis"] = sim.balance().full_partitions();
     j["pair_model"] = sim.model().name();
     const auto& seen = sim.seen();
     j["guard"] = {{"clumped", seen.clumped}, {"most_clumped", seen.most_clumped}, {"deepest_in_wall", seen.deepest}};
