@@ -63,6 +63,7 @@ kuzure: script-not-executable [usr/share/kuzure/machines/*]
 kuzure: unusual-interpreter /usr/bin/pvbatch *
 # There is no address yet.
 kuzure: bogus-mail-host *
+kuzure: bogus-mail-host-in-debian-changelog *
 ")
   ]] COMPONENT data)
 endif()
