@@ -64,10 +64,8 @@ LONG, REASON = 420, "beyond 400 lines:"
 # A function of more lines than this, its body's braces included, is several; those that are not, and why.
 LONG_FUNCTION = 60
 LONG_FUNCTIONS = {
-    ("solver/kernels/leap_frog.hpp", "sum_over_walls"): "one loop over wall points, whose sums stay in registers",
     ("solver/kernels/strain.hpp", "update_strain"): "the update of a cluster, in the order of its equations and in registers",
     ("solver/kernels/staggered_by_the_book.hpp", "force_on"): "the force as it is printed, term after term",
-    ("solver/run/wall_forces.cpp", "for_each_force"): "the walls of the pair loop once more, in its order, shared among them",
     ("io/machine_profile.cpp", "make_keys"): "a table, one row a key",
 }
 
