@@ -284,6 +284,7 @@ RunScene run_scene(const Base& base, double spacing, const Member& m, const std:
     s.output.history = s.time.end / 200;
     s.output.checkpoint_minutes = 2;
     s.maps = maps_for(base.scene, base.coarsest);
+    s.maps->wet *= base.recorded;
     s.time.retry = true;
 
     const auto inputs_of_all = inputs_of(base.uncertain);

@@ -15,6 +15,7 @@ struct Base {
     double volume = 0;                                                    // m^3
     Vector centre{};                                                      // m, of the soil, in the scene's coordinates
     double coarsest = 0;                                                  // m, of all runs: cells and least thickness of maps go by it
+    double recorded = 1;                                                  // times the least thickness: from which runs record soil
     double spacing_of(double layers) const { return thickness / layers; } // m
     double layers_of(double spacing) const { return thickness / spacing; }
 };
