@@ -2,6 +2,7 @@
 #include "solver/app/hazard/search.hpp"
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <gtest/gtest.h>
 #include <limits>
@@ -75,6 +76,27 @@ TEST(Search, NoiseMovesTheBestByWhatIsAlikeAtMost)
         EXPECT_GE(d.verdict->intervals[0].high, 23.3);
         EXPECT_LE(d.trials.size(), 40u);
     }
+}
+
+TEST(Search, TheScatterIsThatOfTheNoiseAndNoneOfAStraightCurve)
+{
+    auto axes = friction(10, 40, 65);
+    choose_parts(axes);
+    const auto of = [&](double noise) {
+        std::vector<Trial> trials;
+        std::uint64_t state = 7;
+        for (int i = 0; i <= axes[0].parts; ++i) {
+            double sum = -6; // of twelve numbers in [0, 1): variance 1
+            for (int k = 0; k < 12; ++k)
+                state = state * 6364136223846793005ull + 1442695040888963407ull, sum += double(state >> 11) * 0x1p-53;
+            trials.push_back({{i}, 0.02 * std::fabs(axes[0].value(i) - 24) + noise * sum});
+        }
+        return scatter_of(trials);
+    };
+    EXPECT_LT(of(0), 1e-9);
+    EXPECT_NEAR(of(0.01), 0.02, 0.006);
+    EXPECT_EQ(scatter_of({{{0}, 0.3}, {{1}, 0.2}, {{2}, 0.4}}), 0);
+    EXPECT_EQ(scatter_of({}), 0);
 }
 
 TEST(Search, TwoValleysAreNotOne)

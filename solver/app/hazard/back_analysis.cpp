@@ -1,4 +1,5 @@
 #include "solver/app/hazard/back_analysis.hpp"
+#include "io/csv.hpp"
 #include "io/ground/raster.hpp"
 #include "io/map_picture.hpp"
 #include "io/owner.hpp"
@@ -20,9 +21,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* mark = "fit_plan.json";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step
-/// Times the layers of the best run, and again, for particles at other places: enough to move all of them, too few for another answer.
-constexpr double twin_layers = 1.08;
-constexpr int twins_wanted = 2;
+/// Times the layers of the best run, for particles at other places: enough to move all of them, too few for another answer.
+constexpr std::array twin_layers{1.08, 1.17};
 /// Below it soil is recorded too, so that outlines can be drawn through the cells in between.
 constexpr double recorded = 0.1;
 
@@ -191,7 +191,7 @@ private:
         const auto maps = maps_for(base_.scene, spacing_);
         cell_ = maps.cell, wet_ = maps.wet;
         if (observed_.deposit) observed_ = read_observed(args_.observed, base_, checked_->filling, wet_); // of what counts in these runs
-        of_cells_ = misfit_of_cells(observed_, cell_), alike_ = of_cells_;
+        of_cells_ = misfit_of_cells(observed_, cell_);
         plan_["spacing"] = spacing_;
         keep_plan();
         std::vector<std::string> ranges;
@@ -213,10 +213,13 @@ private:
         return all;
     }
 
+    /// By how much misfits differ that cannot be told apart.
+    double alike() const { return std::max({of_cells_, scatter_of(trials()), std::isnan(of_twins_) ? 0 : of_twins_}); }
+
     void search()
     {
         while (!over()) {
-            const auto next = next_trials(axes_, trials(), alike_);
+            const auto next = next_trials(axes_, trials(), alike());
             if (next.empty()) break;
             std::vector<Run*> todo;
             for (const auto& at : next) {
@@ -268,21 +271,18 @@ private:
     /// The best values once more with particles at other places: what comes out otherwise is not the input's doing.
     void twins()
     {
-        const auto v = judge(axes_, trials(), alike_);
+        const auto v = judge(axes_, trials(), alike());
         if (!v || v->at_end) return;
         if (fixed_spacing_) return;
         std::vector<Run*> todo;
-        double spacing = spacing_;
-        for (int k = 0; k < twins_wanted; ++k) {
-            // Boxes hold whole layers: the next that is another.
-            const double last = spacing;
-            for (double wanted = last / twin_layers; spacing > 0.97 * last && wanted > 0.5 * spacing_; wanted *= 0.97)
-                spacing = possible_spacing(base_, wanted);
-            if (spacing > 0.97 * last) break;
+        for (const double more : twin_layers) {
+            const double wanted = spacing_ / more, spacing = possible_spacing(base_, wanted);
+            if (std::fabs(spacing / wanted - 1) > 0.01) continue; // boxes hold whole layers: another volume is no twin
             auto& r = queue_->add(Part::Finer, member_at(v->best), spacing, fmt::format("runs/twin-{:.3g}", base_.layers_of(spacing)));
             twins_.push_back({&r, v->best, {}});
             todo.push_back(&r);
         }
+        twins_wanted_ = !todo.empty();
         if (todo.empty()) return;
         work(todo);
         double low = v->misfit, high = v->misfit;
@@ -290,7 +290,7 @@ private:
         for (const auto& t : twins_)
             if (t.run->finished()) low = std::min(low, t.compared.misfit), high = std::max(high, t.compared.misfit), any = true;
         if (!any) return;
-        of_twins_ = high - low, alike_ = std::max(of_cells_, of_twins_);
+        of_twins_ = high - low;
     }
 
     // ---- what is published
@@ -298,22 +298,22 @@ private:
     BackState state(bool final)
     {
         BackState s{.base = base_, .scene_file = args_.scene.file, .observed = observed_, .axes = axes_, .tried = tried_, .twins = twins_};
-        s.verdict = judge(axes_, trials(), alike_);
-        s.alike = alike_, s.of_cells = of_cells_, s.of_twins = of_twins_, s.cell = cell_, s.wet = wet_;
+        s.verdict = judge(axes_, trials(), alike());
+        s.alike = alike(), s.of_cells = of_cells_, s.of_twins = of_twins_, s.of_curve = scatter_of(trials()), s.cell = cell_, s.wet = wet_;
         s.spacing = spacing_, s.layers = base_.layers_of(spacing_), s.ended = now(), s.final = final;
         if (s.verdict) s.moving = moving_of(s.best());
         if (final) s.not_done = not_done();
         return s;
     }
+    /// Kinetic energy at the end over its greatest.
     double moving_of(const Tried& t) const
     {
-        try {
-            const auto e = Json::parse(io::read_text(out_ / t.run->directory / "summary.json")).at("energy");
-            const double freed = -e.at("potential").get<double>();
-            return freed > 0 ? e.at("kinetic").get<double>() / freed : 0;
-        } catch (const Json::exception&) {
-            return 0;
-        }
+        const auto csv = io::read_csv(out_ / t.run->directory / "history.csv", "history.csv of a run");
+        const auto column = csv.column("kinetic");
+        double most = 0, last = 0;
+        for (const auto& row : csv.rows)
+            if (const auto e = column ? io::csv_number(row.cells[*column]) : std::nullopt) last = *e, most = std::max(most, last);
+        return most > 0 ? last / most : 0;
     }
 
     std::vector<Words> not_done() const
@@ -328,12 +328,12 @@ private:
         if (failed > 0)
             all.push_back({fmt::format("{} of the runs failed and {} not in the curve ({})", failed, failed == 1 ? "is" : "are", why),
                            fmt::format("失敗した計算 {} 件は曲線に含まれていません({})", failed, why)});
-        if (waiting > 0 || !next_trials(axes_, trials(), alike_).empty())
+        if (waiting > 0 || !next_trials(axes_, trials(), alike()).empty())
             all.push_back(
                 {"the search: no time was left to go closer; the same command goes on", "探索の続き: 時間切れ(同じコマンドで続行)"});
-        if (std::isnan(of_twins_))
-            all.push_back({"how much the misfit depends on where the particles are: the interval stands on the cells alone",
-                           "粒子配置による不適合度のばらつき: 区間は格子の誤差だけによります"});
+        if (twins_wanted_ && std::isnan(of_twins_))
+            all.push_back({"the best values with particles at other places: the interval stands on the cells and the curve's scatter alone",
+                           "粒子配置を変えた再計算: 区間は格子と曲線のばらつきだけによります"});
         return all;
     }
 
@@ -400,7 +400,8 @@ private:
     Observed observed_;
     io::Path out_;
     int cores_ = 1, jobs_ = 1;
-    double spacing_ = 0, cell_ = 0, wet_ = 0, alike_ = 0, of_cells_ = 0, of_twins_ = nan;
+    double spacing_ = 0, cell_ = 0, wet_ = 0, of_cells_ = 0, of_twins_ = nan;
+    bool twins_wanted_ = false;
     Json plan_;
     std::vector<Tried> tried_, twins_;
     std::optional<Queue> queue_;

@@ -155,7 +155,8 @@ private:
         row(t("counts from", "到達とする厚さ"), fmt::format("{:g} m", s_.wet));
         row(t("cell", "格子"), fmt::format("{:g} m", s_.cell));
         row(t("cannot be told apart within", "区別できない不適合度の差"),
-            fmt::format("{:.2g} ({} {:.2g}, {} {})", s_.alike, t("cells", "格子"), s_.of_cells, t("particles at other places", "粒子配置"),
+            fmt::format("{:.2g} ({} {:.2g}, {} {:.2g}, {} {})", s_.alike, t("cells", "格子"), s_.of_cells,
+                        t("scatter of the curve", "曲線のばらつき"), s_.of_curve, t("particles at other places", "粒子配置"),
                         std::isnan(s_.of_twins) ? "–" : fmt::format("{:.2g}", s_.of_twins)));
         row(t("program", "プログラム"), version_text());
         return fmt::format("<table class=\"text\"><thead><tr><th>{}</th><th>{}</th></tr></thead><tbody>\n{}</tbody></table>\n",
@@ -236,9 +237,9 @@ std::vector<Words> meaning(const BackState& s)
     if (s.moving > still_moving)
         all.push_back(
             {fmt::format(
-                 "The soil of the best run still moves at its end ({:.1f} % of the energy that was freed). Remedy: --set time.end={:g}",
+                 "The soil of the best run still moves at its end ({:.1f} % of its greatest kinetic energy). Remedy: --set time.end={:g}",
                  100 * s.moving, 2 * s.base.scene.time.end),
-             fmt::format("最良の計算は終了時にまだ動いています(解放エネルギーの {:.1f} %)。対処: --set time.end={:g}", 100 * s.moving,
+             fmt::format("最良の計算は終了時にまだ動いています(最大運動エネルギーの {:.1f} %)。対処: --set time.end={:g}", 100 * s.moving,
                          2 * s.base.scene.time.end)});
     all.push_back(
         {"It makes up for what the model leaves out, and belongs to this scene with its volume and layers: good for events like this one",
@@ -329,7 +330,7 @@ Json to_json(const BackState& s)
             {"more_than_one_answer", v.split},
             {"misfit", misfit},
             {"best_run", compared(s.best())},
-            {"alike", {{"misfit", s.alike}, {"cells", s.of_cells}, {"particles", number(s.of_twins)}}},
+            {"alike", {{"misfit", s.alike}, {"cells", s.of_cells}, {"curve", s.of_curve}, {"particles", number(s.of_twins)}}},
             {"moving_at_end", s.moving},
             {"says", says},
             {"layers", s.layers},

@@ -89,6 +89,24 @@ std::vector<std::vector<int>> next_trials(const std::vector<Axis>& axes, std::ve
     return next;
 }
 
+double scatter_of(std::vector<Trial> trials)
+{
+    std::erase_if(trials, [](const Trial& t) { return std::isnan(t.misfit) || t.at.size() != 1; });
+    std::sort(trials.begin(), trials.end());
+    const auto best = best_of(trials);
+    std::vector<double> distances; // in standard deviations of one value
+    for (std::size_t k = 1; k + 1 < trials.size(); ++k) {
+        if (k + 1 >= *best && k <= *best + 1) continue; // a valley may be sharp
+        const auto &a = trials[k - 1], &b = trials[k], &c = trials[k + 1];
+        const double w = double(c.at[0] - b.at[0]) / (c.at[0] - a.at[0]);
+        distances.push_back(std::fabs(b.misfit - w * a.misfit - (1 - w) * c.misfit) / std::sqrt(1 + w * w + (1 - w) * (1 - w)));
+    }
+    if (distances.size() < 5) return 0;
+    const auto middle = distances.begin() + std::ptrdiff_t(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return 2 * 1.4826 * *middle; // of a normal distribution
+}
+
 std::optional<Verdict> judge(const std::vector<Axis>& axes, std::vector<Trial> trials, double alike)
 {
     std::sort(trials.begin(), trials.end());

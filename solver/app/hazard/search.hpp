@@ -31,6 +31,10 @@ struct Trial {
 /// best at half the step, a quarter and so on.
 std::vector<std::vector<int>> next_trials(const std::vector<Axis>&, std::vector<Trial>, double alike);
 
+/// How far misfits of one number scatter about a smooth curve: two standard deviations, by the median distance of a value from the line
+/// between its neighbours, those at the best left out. 0 for fewer than five such, and for two numbers.
+double scatter_of(std::vector<Trial>);
+
 /// What the trials say.
 struct Verdict {
     std::vector<int> best;
