@@ -121,12 +121,38 @@ check(end["at_end_of_range"] and end["interval"] is None and end["best"] == 22, 
 check("end of the range" in done.stdout and "wider" in done.stdout, "and it says so, with the remedy")
 
 # ---- a deposit, two inputs, coarser, by a deadline
-call("fit", unknown, "--observed", os.path.join("event", "maps", "h_end.tif"), "--input", "bed_friction=12,24", "--values", "4", "-o", "deposit")
+call(
+    "fit",
+    unknown,
+    "--observed",
+    os.path.join("event", "maps", "h_end.tif"),
+    "--input",
+    "bed_friction=12,24",
+    "--values",
+    "4",
+    "-o",
+    "deposit",
+)
 deposit = answer("deposit")
 check(abs(deposit["best"] - TRUE) < 1 and deposit["observed"]["kind"] == "deposit", f"from the deposit: {deposit['best']}")
 check(deposit["best_run"]["rms_thickness"] < 0.05, f"with the error of its thickness: {deposit['best_run']}")
 both = scene("both", more="[uncertain]\nbed_friction = { low = 8.0, likely = 20.0, high = 32.0 }\n")
-call("fit", both, "--observed", outline, "--input", "bed_friction", "--input", "thickness=0.5,1.5", "--values", "3", "--layers", "3", "-o", "two")
+call(
+    "fit",
+    both,
+    "--observed",
+    outline,
+    "--input",
+    "bed_friction",
+    "--input",
+    "thickness=0.5,1.5",
+    "--values",
+    "3",
+    "--layers",
+    "3",
+    "-o",
+    "two",
+)
 two = answer("two")
 check(set(two["best"]) == {"bed_friction", "thickness"} and len(two["misfit"][0]) == 3, f"two inputs: {two['best']}")
 check(two["layers"] < 4 and len(two["misfit"]) > 9, "with the layers asked for, the scan and closer")
@@ -149,13 +175,10 @@ def ring(name, corners, **more):
 
 
 refused("no-file", "no.shp", "--observed", observed="no.shp")
-refused("a-table", "table.csv", observed=shutil.copy(os.path.join(work, "found", "curve.csv"), os.path.join(work, "table.csv")) and "table.csv")
 refused(
-    "elsewhere",
-    "another",
-    "beside",
-    observed=ring("far.geojson", [[50, 50], [60, 50], [60, 60], [50, 50]], crs=None),
+    "a-table", "table.csv", observed=shutil.copy(os.path.join(work, "found", "curve.csv"), os.path.join(work, "table.csv")) and "table.csv"
 )
+refused("elsewhere", "another", "beside", observed=ring("far.geojson", [[50, 50], [60, 50], [60, 60], [50, 50]], crs=None))
 refused("on-the-globe", "coordinate system", observed=ring("globe.geojson", [[0, 0], [1, 0], [1, 1], [0, 0]]))
 refused("open-ring", "open", observed=ring("open.geojson", [[0, 0], [1, 0], [1, 1], [0, 1]], crs=None))
 refused("unknown-input", "--input bed", "bed_friction", args=("--input", "bed"))

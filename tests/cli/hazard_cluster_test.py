@@ -92,11 +92,7 @@ cp "${@: -1}" "$SPOOL/$id.sh" && printf '%s\\n' "${@:1:$#-1}" >"$SPOOL/$id.words
 write("bin/sbatch", SUBMIT.replace("{more}", ";cluster"), executable=True)
 write("bin/qsub", SUBMIT.replace("{more}", ".server"), executable=True)
 write("bin/scontrol", '#!/bin/bash\n[ "$1" = requeue ] && echo "$2" >>"$SPOOL/requeued" && kill $PPID\n', executable=True)
-write(
-    "bin/srun",
-    '#!/bin/bash\nwhile [[ $1 == --* ]]; do shift; done\nexec mpirun -n "$SLURM_NTASKS" "$@"\n',
-    executable=True,
-)
+write("bin/srun", '#!/bin/bash\nwhile [[ $1 == --* ]]; do shift; done\nexec mpirun -n "$SLURM_NTASKS" "$@"\n', executable=True)
 # With HURRY a run stops after a step or a few.
 hasty = write(
     "hasty kuzure",
@@ -137,7 +133,9 @@ def bash(script, spool, **more):
 
 
 def script_of(machine, out, ranks):
-    text = call("job", scene, "--machine", f"./{machine}.toml", "--nodes", "1", "--ranks-per-node", ranks, *RUNS, "-o", out, "--minutes", "6")
+    text = call(
+        "job", scene, "--machine", f"./{machine}.toml", "--nodes", "1", "--ranks-per-node", ranks, *RUNS, "-o", out, "--minutes", "6"
+    )
     write(f"{out}.sh", text)
     done = subprocess.run(["bash", "-n", os.path.join(work, f"{out}.sh")], capture_output=True, text=True)
     check(done.returncode == 0 and "{{" not in text, f"{machine}: sound shell {done.stderr}")
@@ -164,13 +162,17 @@ def slurm():
     check([code for _, code, _ in said] == [0, -15, 0, 0, 0, 0] and read("spool/requeued").split() == ["803"], f"tasks: {said}")
     check(all(os.path.exists(os.path.join(work, "by slurm", d, "summary.json")) for d in ("preliminary", "likely", "members/001")), "ran")
     done = bash(script, "spool", SLURM_JOB_ID="701", SLURM_NTASKS="2")
-    check(done.returncode == 0 and done.stdout.count("there already") == 5, f"the answer takes five runs and makes two: {done.stdout[-600:]}")
+    check(
+        done.returncode == 0 and done.stdout.count("there already") == 5, f"the answer takes five runs and makes two: {done.stdout[-600:]}"
+    )
     check(harness.digest(os.path.join(work, "by slurm"), ()) == want, "Slurm: the bytes of every map are those of one machine")
     bash(script, "spool")
     done = bash(script, "spool", SLURM_JOB_ID="805", SLURM_ARRAY_TASK_ID="5", SLURM_NTASKS="2")
     check(done.returncode == 0 and "finished already" in done.stdout, f"started again nothing is run twice: {done.stdout[-200:]}")
     done = bash(script, "spool", SLURM_JOB_ID="703", SLURM_NTASKS="2")
-    check(done.stdout.count("there already") == COUNT and harness.digest(os.path.join(work, "by slurm"), ()) == want, "and the answer stays")
+    check(
+        done.stdout.count("there already") == COUNT and harness.digest(os.path.join(work, "by slurm"), ()) == want, "and the answer stays"
+    )
     done = bash(script, "spool", SLURM_JOB_ID="805", SLURM_ARRAY_TASK_ID=str(COUNT + 1), SLURM_NTASKS="2")
     check(done.returncode == 1 and f"no run {COUNT + 1}" in done.stderr, "a task without a run says so")
 

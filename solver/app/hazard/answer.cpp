@@ -298,7 +298,7 @@ void write_maps(const Base& base, Answer& answer, const std::vector<io::NamedPoi
         add("arrival_90", "s", "arrival, 90 % of the runs that come are earlier");
     const auto thickness = add("h_10", "m", "greatest thickness, 10 %");
     add("h_median", "m", "greatest thickness, median"), add("h_90", "m", "greatest thickness, 90 %");
-    const auto maps = maps_for(base.scene, base.coarsest);
+    const auto maps = maps_of_runs(base);
     const auto deep = layers.size();
     for (const double limit : maps.limits) add(fmt::format("p_h_{:g}", limit), "1", "probability of a thickness");
     const auto pressed = layers.size();

@@ -35,12 +35,12 @@ public:
             throw BadInput("kuzure fit starts its runs itself: start it without mpirun; --jobs says how many run at a time");
         if (a.layers.find(',') != a.layers.npos)
             throw BadInput(fmt::format("--layers: expected one number, of all runs, found \"{}\"", a.layers));
-        checked_.emplace(a.scene.read(comm));
+        const auto checked = a.scene.read(comm);
         auto uncertain = io::parse_uncertain(io::read_scene_text(a.scene.file), a.scene.file, a.scene.sets).value_or(scene::Uncertain{});
         uncertain.dem_error.reset();
         axes_ = axes_for(a.inputs, a.values, uncertain);
-        base_ = base_of(*checked_, uncertain, a.scene.file);
-        base_.recorded = recorded;
+        base_ = base_of(checked, uncertain, a.scene.file);
+        base_.wet = base_.scene.maps->wet, base_.recorded = recorded; // the event is what it is, however coarse the runs
         const double own = base_.scene.space.spacing;
         fixed_spacing_ = !base_.scene.start.from.empty();
         if (fixed_spacing_ && layers_.given)
@@ -48,9 +48,7 @@ public:
                                        "leave it out",
                                        a.scene.file));
         spacing_ = layers_.given ? possible_spacing(base_, base_.spacing_of(layers_.ensemble)) : own;
-        const auto read = [&](double at) { return read_observed(a.observed, base_, checked_->filling, maps_for(base_.scene, at).wet); };
-        if (within_ > 0 && !layers_.given) read(coarse_spacing()); // what is refused is refused before anything is run
-        observed_ = read(own);
+        observed_ = read_observed(a.observed, base_, checked.filling, base_.wet);
         out_ = directory_for(a.output, base_.scene, a.scene.file, "fit");
         cores_ = std::max(1, cores_here());
         jobs_ = std::min(a.jobs > 0 ? a.jobs : cores_, study::most_children);
@@ -188,9 +186,8 @@ private:
     void begin_runs()
     {
         base_.coarsest = spacing_;
-        const auto maps = maps_for(base_.scene, spacing_);
+        const auto maps = maps_of_runs(base_);
         cell_ = maps.cell, wet_ = maps.wet;
-        if (observed_.deposit) observed_ = read_observed(args_.observed, base_, checked_->filling, wet_); // of what counts in these runs
         of_cells_ = misfit_of_cells(observed_, cell_);
         plan_["spacing"] = spacing_;
         keep_plan();
@@ -396,7 +393,6 @@ private:
     Base base_;
     bool fixed_spacing_ = false;
     std::vector<Axis> axes_;
-    std::optional<scene::CheckedScene> checked_;
     Observed observed_;
     io::Path out_;
     int cores_ = 1, jobs_ = 1;

@@ -129,7 +129,7 @@ Json to_json(const State& st, const Answer& a)
         for (const auto& w : lines) list.push_back(w.en);
         return list;
     };
-    const auto maps = maps_for(st.base.scene, st.base.coarsest);
+    const auto maps = maps_of_runs(st.base);
     Json j{{"title", st.base.scene.title},
            {"version", version_text()},
            {"scene", st.scene_file},
