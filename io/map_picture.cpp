@@ -41,8 +41,9 @@ struct View {
     double y(int row) const { return high_y - (row + 0.5) / scale; }
 };
 
-View view_of(const scene::Grid& g)
+View view_of(const MapPicture& m)
 {
+    const auto& g = m.values;
     double low_x = HUGE_VAL, low_y = HUGE_VAL, high_x = -HUGE_VAL, high_y = -HUGE_VAL;
     for (int row = 0; row < g.rows; ++row)
         for (int column = 0; column < g.columns; ++column) {
@@ -51,6 +52,13 @@ View view_of(const scene::Grid& g)
             low_x = std::min(low_x, x - half), high_x = std::max(high_x, x + half);
             low_y = std::min(low_y, y - half), high_y = std::max(high_y, y + half);
         }
+    if (m.whole_outlines)
+        for (const auto& outline : m.outlines)
+            for (const auto& area : outline.areas)
+                for (const auto& ring : area)
+                    for (const auto& p : ring)
+                        low_x = std::min(low_x, p[0]), high_x = std::max(high_x, p[0]), low_y = std::min(low_y, p[1]),
+                        high_y = std::max(high_y, p[1]);
     if (low_x > high_x)
         low_x = g.x, low_y = g.y, high_x = g.x + std::max(1, g.columns) * g.cell, high_y = g.y + std::max(1, g.rows) * g.cell;
     // Some of what is around; no map is a strip.
@@ -194,7 +202,7 @@ void draw_legend(Canvas& canvas, const MapPicture& m, const View& v, const Scale
 
 std::string map_png(const MapPicture& m)
 {
-    const View v = view_of(m.values);
+    const View v = view_of(m);
     const Scale scale = scale_of(m);
     Canvas canvas(left + v.width + right, top + v.height + bottom);
     draw_cells(canvas, m, v, scale);

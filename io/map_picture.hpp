@@ -17,6 +17,7 @@ struct MapPicture {
         std::string label = {}; // in the legend; empty: h_max at the limit
     };
     std::vector<Outline> outlines;
+    bool whole_outlines = false; // all of them are shown, also where there are no values
 };
 
 /// The bytes of a PNG that shows where there are values, and some of what is around them. Throws BadInput where can_draw() is false.

@@ -28,7 +28,7 @@ private:
 };
 
 /// A raster's values at the points of a grid in another place of the map or another system: its own where the grids coincide, else
-/// bilinear, of means of its cells where those are much smaller; NaN where it has none.
+/// bilinear, of means of its cells where those are much smaller; NaN where it has none. Both without a system lie in the same place.
 std::vector<double> onto(const Path&, const scene::Grid& target, const std::string& crs);
 
 /// The system of a file that names none, or its own; throws BadInput where neither is there, or where it is another one than the map's.

@@ -83,7 +83,7 @@ double bilinear(const scene::Grid& g, double x, double y)
 void sample(const Raster& from, scene::Grid& to, const std::string& crs)
 {
     if (from.grid.columns == 0) return;
-    const bool same = same_crs(from.crs, crs);
+    const bool same = from.crs == crs || same_crs(from.crs, crs);
     if (same && coincide(from.grid, to)) return fill_from(to, from.grid);
     std::optional<Transform> way;
     if (!same) way.emplace(from.crs, crs, "elevation model");
@@ -244,11 +244,12 @@ scene::Grid Mosaic::read(const std::optional<Window>& window) const
 std::vector<double> onto(const Path& path, const scene::Grid& target, const std::string& crs)
 {
     auto info = raster_info(path);
-    if (info.crs.empty()) check_numbers(info, crs, path);
-    info.crs = crs_for(info.crs, crs, path.string());
-    check_numbers(info, info.crs, path);
-    Window part = wider(extent_of(target), 2 * std::max(target.cell, same_crs(info.crs, crs) ? info.grid.cell : 0));
-    if (!same_crs(info.crs, crs)) part = wider(moved(part, Transform(crs, info.crs, path.string())), 2 * info.grid.cell);
+    const bool local = info.crs.empty() && crs.empty(); // neither lies on a map
+    if (info.crs.empty() && !local) check_numbers(info, crs, path);
+    if (!local) info.crs = crs_for(info.crs, crs, path.string()), check_numbers(info, info.crs, path);
+    const bool same = local || same_crs(info.crs, crs);
+    Window part = wider(extent_of(target), 2 * std::max(target.cell, same ? info.grid.cell : 0));
+    if (!same) part = wider(moved(part, Transform(crs, info.crs, path.string())), 2 * info.grid.cell);
     Raster r = read_raster(path, part);
     r.crs = info.crs;
     scene::Grid g = target;

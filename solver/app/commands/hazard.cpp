@@ -22,6 +22,9 @@ void add_hazard(CLI::App& app, Action& chosen)
             "no finer run (default: 4, and what the time allows)")
         ->type_name("N[,N[,N]]");
     command->add_option("--jobs", a->jobs, "runs at a time (default: one a core)")->check(CLI::Range(1, 1024));
+    command->add_flag("--prepare", a->prepare,
+                      "run nothing: write the scenes of all runs, and how each is run into DIR/runs.txt; with --layers (kuzure job "
+                      "--members N makes a cluster's script of it)");
     command->add_option("--members-from", a->members_from, "run nothing: the answer of the runs that this hazard.json lists, once more")
         ->type_name("FILE");
     command->callback([=, &chosen] { chosen = [=](const Comm& comm) { return hazard::run_hazard(comm, *a); }; });

@@ -18,7 +18,15 @@ void add_job(CLI::App& app, Action& chosen)
     command->add_option("--account", a->account, "project that pays")->type_name("NAME");
     command->add_option("--minutes", a->minutes, "clock limit of a job (default: from the predicted time)")->check(CLI::Range(1.0, 1e6));
     command->add_option("--ranks-per-node", a->ranks_per_node, "ranks on each node (default: the profile's)")->check(CLI::Range(1, 4096));
-    command->add_option("-o,--output", a->output, "result directory (default: as kuzure run)")->type_name("DIR");
+    command
+        ->add_option("--members", a->members,
+                     "a hazard: its runs as the tasks of a job array, each on so many nodes, and a job that makes the answer of them")
+        ->check(CLI::Range(1, 10000));
+    command
+        ->add_option("--layers", a->layers,
+                     "of a hazard: layers of its preliminary run, members and finer run (default: 4, the scene's own)")
+        ->type_name("N[,N[,N]]");
+    command->add_option("-o,--output", a->output, "result directory (default: as kuzure run, kuzure hazard)")->type_name("DIR");
     under_heading(*command, "What the job asks for",
                   {"--machine", "--nodes", "--ranks-per-node", "--queue", "--mode", "--account", "--minutes"});
     command->callback([=, &chosen] {

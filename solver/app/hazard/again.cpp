@@ -37,9 +37,7 @@ Exit answer_again(Base base, const Arguments& args, const std::vector<io::NamedP
                 r.directory = m.at("directory").get<std::string>(), r.seconds = m.at("seconds");
                 r.message = m.value("message", std::string());
                 for (const auto& input : inputs_of(base.uncertain)) r.member.values.push_back(m.at("settings").at(input.name));
-                if (r.finished())
-                    r.maps =
-                        std::make_shared<const RunMaps>(read_maps(folder / r.directory, base, maps_for(base.scene, base.coarsest).wet));
+                if (r.finished()) r.maps = std::make_shared<const RunMaps>(read_maps(folder / r.directory, base, maps_of_runs(base).wet));
                 all.push_back(std::move(r));
             }
     } catch (const Json::exception& e) {

@@ -322,7 +322,7 @@ void write_maps(const Base& base, Answer& answer, const std::vector<io::NamedPoi
 {
     const auto grid = around(answer.counted);
     const auto& crs = base.scene.map_frame.crs;
-    const auto limits = maps_for(base.scene, base.coarsest).limits;
+    const auto limits = maps_of_runs(base).limits;
     Layers layers = layers_for(base, std::size_t(grid.count()), limits);
     answer.points.clear();
     for (const auto& p : points) answer.points.push_back({p, 0, {nan, nan, nan}, {0, 0, 0}, 0});

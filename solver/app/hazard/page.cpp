@@ -100,7 +100,7 @@ private:
     std::string map() const
     {
         const auto& crs = s_.base.scene.map_frame.crs;
-        const auto maps = maps_for(s_.base.scene, s_.base.coarsest);
+        const auto maps = maps_of_runs(s_.base);
         std::string s = picture("p_reach", t("probability of reach, with the outlines of 5, 50 and 95 %", "到達確率と 5・50・95 % の範囲"));
         s += fmt::format("<p class=\"soft small\">{}</p>\n",
                          escaped(ja_ ? fmt::format("厚さ {} m 以上を到達とします。格子 {} m。座標系: {}。", shown(maps.wet),

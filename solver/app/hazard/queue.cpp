@@ -1,5 +1,6 @@
 #include "solver/app/hazard/queue.hpp"
 #include "io/owner.hpp"
+#include "io/quote.hpp"
 #include "solver/core/wall_clock.hpp"
 #include <algorithm>
 #include <chrono>
@@ -67,6 +68,21 @@ bool Queue::prepare(Run& r, RunScene& scene) const
     return same;
 }
 
+std::vector<std::string> Queue::words_of(const Run& r, const RunScene& scene) const
+{
+    std::vector<std::string> words{(out_ / "scenes" / (flat(r) + ".toml")).string(), "-o", (out_ / r.directory).string()};
+    for (const auto& s : scene.sets) words.insert(words.end(), {"--set", s});
+    return words;
+}
+std::string Queue::prepare_only(Run& r) const
+{
+    RunScene scene;
+    prepare(r, scene);
+    std::string text;
+    for (const auto& w : words_of(r, scene)) text += (text.empty() ? "" : " ") + io::shell_word(w);
+    return text;
+}
+
 /// What is left of an earlier call: takes what is finished, waits for a run that is still ending.
 void Queue::take_what_is_there(Run& r) const
 {
@@ -100,7 +116,7 @@ void Queue::take_what_is_there(Run& r) const
 
 void Queue::finish(Run& r) const
 {
-    r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_for(base_.scene, base_.coarsest).wet));
+    r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_of_runs(base_).wet));
     r.status = Status::Finished;
     // Only the results count: a checkpoint of each of many runs would fill the disk.
     std::error_code error;
@@ -160,17 +176,10 @@ std::optional<Queue::Running> Queue::start(Run& r, int threads) const
         say(fmt::format("  {}: there already, {}", r.directory.string(), word(r.status)));
         return std::nullopt;
     }
-    const std::string name = flat(r);
-    std::vector<std::string> words{"run",
-                                   (out_ / "scenes" / (name + ".toml")).string(),
-                                   "-o",
-                                   (out_ / r.directory).string(),
-                                   "--restart",
-                                   "--threads",
-                                   std::to_string(threads),
-                                   "--quiet"};
-    for (const auto& s : scene.sets) words.insert(words.end(), {"--set", s});
-    return Running{study::Child(words, out_ / "logs" / (name + ".txt"), true), &r, wall_clock()};
+    std::vector<std::string> words{"run"};
+    for (auto& w : words_of(r, scene)) words.push_back(std::move(w));
+    words.insert(words.end(), {"--restart", "--threads", std::to_string(threads), "--quiet"});
+    return Running{study::Child(words, out_ / "logs" / (flat(r) + ".txt"), true), &r, wall_clock()};
 }
 
 void Queue::conclude(Run& r, const study::ChildResult& ended) const

@@ -26,6 +26,8 @@ public:
     std::deque<Run> runs; // they are pointed at
 
     Run& add(Part, Member, double spacing, const std::string& name);
+    /// Writes a run's scene and starts nothing; what kuzure run is told for it, as words of a shell. Throws BadInput, IoFailed.
+    std::string prepare_only(Run&) const;
     /// Runs what fits before the deadline, in order. `expected`: s each, until the first has ended.
     void work(std::vector<Run*> todo, int jobs, int threads, double expected);
 
@@ -37,6 +39,7 @@ private:
     };
     bool over() const { return left_() <= 0 || stopped_(); }
     bool prepare(Run&, RunScene&) const;
+    std::vector<std::string> words_of(const Run&, const RunScene&) const;
     void take_what_is_there(Run&) const;
     void finish(Run&) const;
     std::optional<Running> start(Run&, int threads) const;

@@ -271,6 +271,13 @@ scene::Maps maps_for(const Scene& s, double coarsest)
     return m;
 }
 
+scene::Maps maps_of_runs(const Base& base)
+{
+    scene::Maps m = maps_for(base.scene, base.coarsest);
+    if (base.wet > 0) m.wet = base.wet;
+    return m;
+}
+
 RunScene run_scene(const Base& base, double spacing, const Member& m, const std::string& title, const io::Path& inputs)
 {
     RunScene out;
@@ -283,7 +290,8 @@ RunScene run_scene(const Base& base, double spacing, const Member& m, const std:
     s.output.fields = {"velocity"};
     s.output.history = s.time.end / 200;
     s.output.checkpoint_minutes = 2;
-    s.maps = maps_for(base.scene, base.coarsest);
+    s.maps = maps_of_runs(base);
+    s.maps->wet *= base.recorded;
     s.time.retry = true;
 
     const auto inputs_of_all = inputs_of(base.uncertain);

@@ -10,11 +10,13 @@ namespace kuzure::hazard {
 /// The user's scene, and what all runs share.
 struct Base {
     Scene scene;
-    scene::Uncertain uncertain;                                           // without inputs where the scene has none
-    double thickness = 0;                                                 // m, mean of the soil over its columns
-    double volume = 0;                                                    // m^3
-    Vector centre{};                                                      // m, of the soil, in the scene's coordinates
-    double coarsest = 0;                                                  // m, of all runs: cells and least thickness of maps go by it
+    scene::Uncertain uncertain; // without inputs where the scene has none
+    double thickness = 0;       // m, mean of the soil over its columns
+    double volume = 0;          // m^3
+    Vector centre{};            // m, of the soil, in the scene's coordinates
+    double coarsest = 0;        // m, of all runs: cells and least thickness of maps go by it
+    double wet = 0;             // m, from which soil counts in all runs; 0: the scene's, or more where the coarsest run asks for it
+    double recorded = 1;        // times that: from which runs record soil
     double spacing_of(double layers) const { return thickness / layers; } // m
     double layers_of(double spacing) const { return thickness / spacing; }
 };
@@ -26,6 +28,8 @@ double possible_spacing(const Base&, double wanted);
 
 /// What cells of all maps measure (m) where the coarsest run has this spacing, and from which thickness soil counts.
 scene::Maps maps_for(const Scene&, double coarsest);
+/// Those of all runs.
+scene::Maps maps_of_runs(const Base&);
 
 /// One run's scene as a file, what its command line adds, and what had to be changed, in words.
 struct RunScene {

@@ -1,5 +1,6 @@
 #include "solver/app/hazard/runner.hpp"
 #include "io/owner.hpp"
+#include "solver/app/hazard/directory.hpp"
 #include "solver/app/hazard/page.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/hazard/queue.hpp"
@@ -8,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 namespace kuzure::hazard {
@@ -18,22 +18,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step: reading, forecast
 
-/// "1 to 4, 7"
-std::string ranges_of(std::vector<int> numbers)
-{
-    std::sort(numbers.begin(), numbers.end());
-    std::vector<std::string> parts;
-    for (std::size_t k = 0; k < numbers.size();) {
-        std::size_t end = k + 1;
-        while (end < numbers.size() && numbers[end] == numbers[end - 1] + 1) ++end;
-        parts.push_back(
-            end - k > 2 ? fmt::format("{} to {}", numbers[k], numbers[end - 1])
-                        : fmt::format("{}", fmt::join(numbers.begin() + std::ptrdiff_t(k), numbers.begin() + std::ptrdiff_t(end), ", ")));
-        k = end;
-    }
-    return fmt::format("{}", fmt::join(parts, ", "));
-}
-
 class Hazard {
 public:
     Hazard(const Comm& comm, const Arguments& a)
@@ -41,7 +25,14 @@ public:
     {
         if (comm.size() > 1)
             throw BadInput("kuzure hazard starts its runs itself: start it without mpirun; --jobs says how many run at a time");
-        if (a.within.empty() == a.members_from.empty())
+        if (a.prepare) {
+            if (!a.within.empty() || !a.members_from.empty())
+                throw BadInput("--prepare: expected no --within and no --members-from beside it, for it runs nothing; leave them out");
+            if (!layers_.given)
+                throw BadInput("--prepare: expected --layers, as nothing is measured from which they would follow; write, for example, "
+                               "--layers 4,6,10");
+            within_ = HUGE_VAL;
+        } else if (a.within.empty() == a.members_from.empty())
             throw BadInput(a.within.empty() ? "expected --within TIME, after which the answer is needed; write, for example, --within 30m"
                                             : "expected --within or --members-from, found both: the latter runs nothing");
         const auto checked = a.scene.read(comm);
@@ -54,10 +45,11 @@ public:
                 fmt::format("{}: --members: expected [uncertain] in the scene, from which members are drawn, found none. Remedy: "
                             "[uncertain] bed_friction = {{ low = 16.0, likely = 20.0, high = 28.0 }} (docs/hazard.md)",
                             a.scene.file));
+        if (!varied_ && a.prepare)
+            throw BadInput(fmt::format("{}: --prepare: expected [uncertain] in the scene, found none: it would be one run, kuzure run",
+                                       args_.scene.file));
         points_ = points_of_maps(comm, base_.scene, checked.filling, [&](const std::string& w) { complain(w); });
-        out_ = !a.output.empty()                       ? io::Path(a.output)
-               : !base_.scene.output.directory.empty() ? io::Path(base_.scene.output.directory + "-hazard")
-                                                       : io::Path("results") / (io::Path(a.scene.file).stem().string() + "-hazard");
+        out_ = directory_for(a.output, base_.scene, a.scene.file, "hazard");
         cores_ = std::max(1, cores_here());
         jobs_ = std::min(a.jobs > 0 ? a.jobs : cores_, study::most_children);
     }
@@ -65,7 +57,7 @@ public:
     Exit go()
     {
         if (!args_.members_from.empty()) return answer_again(base_, args_, points_, out_);
-        require_ours();
+        require_ours(out_, "plan.json", "hazard");
         fixed_spacing_ = !base_.scene.start.from.empty();
         begin_plan();
         // What cannot run shall not begin: the corners of what is uncertain are read as a run reads them.
@@ -75,6 +67,7 @@ public:
             io::parse_scene(r.text, fmt::format("{} with the {} values of [uncertain]", args_.scene.file, high ? "high" : "low"), r.sets);
         }
         open();
+        if (args_.prepare) return prepare();
         stop_.emplace();
         queue_.emplace(
             base_, out_, within_, [this] { return left(); }, [this] { return stop_->came(); }, [this] { publish_now_and_then(); });
@@ -103,19 +96,6 @@ private:
     bool over() const { return left() <= 0 || stop_->came(); }
 
     // ---- the directory
-
-    void require_ours() const
-    {
-        std::error_code error;
-        if (std::filesystem::exists(out_, error) && !std::filesystem::is_directory(out_, error))
-            throw BadInput(fmt::format("{}: expected a directory, found a file; choose another with -o DIR", out_.string()));
-        if (std::filesystem::is_directory(out_, error) && !std::filesystem::is_empty(out_, error) &&
-            !std::filesystem::exists(out_ / "plan.json", error))
-            throw BadInput(
-                fmt::format("{}: expected a new directory or that of a hazard, found one with other things in it; choose another "
-                            "with -o DIR",
-                            out_.string()));
-    }
 
     /// What makes runs those of one answer: scene, distributions, the coarsest run.
     std::string identity() const
@@ -161,10 +141,8 @@ private:
 
     void open()
     {
-        std::error_code error;
-        std::filesystem::create_directories(out_, error);
+        make_directories(out_, "members");
         owner_.emplace(io::hold(out_), complain);
-        for (const char* name : {"scenes", "inputs", "logs", "members"}) std::filesystem::create_directories(out_ / name, error);
         keep_plan();
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));
     }
@@ -194,19 +172,52 @@ private:
         return p;
     }
 
+    /// Scenes of all runs, and a line for each that says how it is run. The answer is made by the same command with --within, which finds
+    /// them finished.
+    Exit prepare()
+    {
+        queue_.emplace(
+            base_, out_, within_, [] { return HUGE_VAL; }, [] { return false; }, [] {});
+        queue_->add(Part::Preliminary, likely_member(base_.uncertain), preliminary_spacing_, "preliminary");
+        const Plan p = plan_ensemble();
+        add_ensemble(p);
+        if (layers_.finer > 0 && !fixed_spacing_) {
+            plan_["finer_layers"] = {layers_.finer};
+            add_finer(possible_spacing(base_, base_.spacing_of(layers_.finer)));
+        }
+        keep_plan();
+        std::string lines;
+        for (auto& r : queue_->runs) lines += queue_->prepare_only(r) + "\n";
+        io::write_atomically(out_ / "runs.txt", lines);
+        say(fmt::format("{} runs: kuzure run with a line of {} each, {} members among them; then this command with --within for --prepare",
+                        queue_->runs.size(), (out_ / "runs.txt").string(), p.members));
+        return Exit::Ok;
+    }
+
     double ensemble_spacing(double layers) const
     {
         return fixed_spacing_ ? base_.scene.space.spacing : possible_spacing(base_, base_.spacing_of(layers));
+    }
+
+    std::vector<Run*> add_ensemble(const Plan& p)
+    {
+        const double spacing = ensemble_spacing(p.layers);
+        std::vector<Run*> all;
+        if (spacing != preliminary_spacing_) all.push_back(&queue_->add(Part::Likely, likely_member(base_.uncertain), spacing, "likely"));
+        for (auto& m : draw_members(base_.uncertain, group_, p.members))
+            all.push_back(&queue_->add(Part::Member, m, spacing, fmt::format("members/{:03}", m.number)));
+        return all;
+    }
+    Run& add_finer(double spacing)
+    {
+        return queue_->add(Part::Finer, likely_member(base_.uncertain), spacing, fmt::format("finer-{:.3g}", base_.layers_of(spacing)));
     }
 
     void ensemble(const Plan& p)
     {
         const double spacing = ensemble_spacing(p.layers);
         const int threads = std::max(1, cores_ / jobs_);
-        std::vector<Run*> todo;
-        if (spacing != preliminary_spacing_) todo.push_back(&queue_->add(Part::Likely, likely_member(base_.uncertain), spacing, "likely"));
-        for (auto& m : draw_members(base_.uncertain, group_, p.members))
-            todo.push_back(&queue_->add(Part::Member, m, spacing, fmt::format("members/{:03}", m.number)));
+        const auto todo = add_ensemble(p);
         const double each = cost_.start + (cost_.seconds(base_.layers_of(spacing)) - cost_.start) * std::min(jobs_, cores_);
         say(fmt::format("ensemble: {} members with {:.3g} layers, about {} each", p.members, base_.layers_of(spacing), seconds_text(each)));
         queue_->work(todo, jobs_, threads, 0); // until one is measured, to try costs nothing
@@ -253,7 +264,7 @@ private:
         if (!kept.is_array()) kept = Json::array();
         if (kept.size() <= std::size_t(before)) kept.push_back(layers);
         keep_plan();
-        auto& r = queue_->add(Part::Finer, likely_member(base_.uncertain), spacing, fmt::format("finer-{:.3g}", base_.layers_of(spacing)));
+        auto& r = add_finer(spacing);
         const double expected = cost_.seconds(r.layers);
         say(fmt::format("finer: the likely values with {:.3g} layers, about {}", r.layers, seconds_text(expected)));
         queue_->work({&r}, 1, cores_, layers_.given ? 0 : std::min(expected, 0.98 * left()));
@@ -292,43 +303,7 @@ private:
 
     // ---- what is published
 
-    std::vector<Words> not_done() const
-    {
-        std::vector<Words> all;
-        std::vector<int> waiting, failed;
-        std::vector<std::string> why;
-        for (const auto& r : queue_->runs) {
-            const bool waits = r.status == Status::NotRun || r.status == Status::Stopped;
-            if (r.part == Part::Member) {
-                const bool extra = extra_from_ > 0 && r.member.number >= extra_from_;
-                if (waits && !extra) waiting.push_back(r.member.number);
-                if (r.status == Status::Failed || r.status == Status::Refused) {
-                    failed.push_back(r.member.number);
-                    if (std::ranges::find(why, r.message) == why.end() && why.size() < 3) why.push_back(r.message);
-                }
-            } else if (!r.finished()) {
-                const std::string more = r.message.empty() ? "" : ": " + r.message;
-                all.push_back({fmt::format("the run {} of {:.3g} layers: {}{}", r.directory.string(), r.layers,
-                                           waits ? "no time was left" : word(r.status), more),
-                               fmt::format("計算 {}({:.3g}層): {}{}", r.directory.string(), r.layers, waits ? "時間切れ" : "失敗", more)});
-            }
-        }
-        const auto some = [](const std::vector<int>& n) { return n.size() == 1 ? "member" : "members"; };
-        if (!failed.empty())
-            all.push_back({fmt::format("{} {} failed and {} not counted ({})", some(failed), ranges_of(failed),
-                                       failed.size() == 1 ? "is" : "are", fmt::join(why, "; ")),
-                           fmt::format("メンバー {} は失敗し、確率に数えていません({})", ranges_of(failed), fmt::join(why, "; "))});
-        if (!waiting.empty())
-            all.push_back({fmt::format("{} {}: no time was left", some(waiting), ranges_of(waiting)),
-                           fmt::format("メンバー {}: 時間切れ", ranges_of(waiting))});
-        if (!varied_)
-            all.push_back({"no ensemble: the scene has no [uncertain], so the input's part in the uncertainty is unknown",
-                           "アンサンブルなし: シーンに [uncertain] がないため、入力の不確かさは含まれていません"});
-        if (!finer_not_done_.en.empty() && std::ranges::none_of(queue_->runs, [](const Run& r) { return r.part == Part::Finer; }))
-            all.push_back({"no finer run: " + finer_not_done_.en, "より細かい計算なし: " + finer_not_done_.ja});
-        return all;
-    }
-
+    std::vector<Words> what_is_not_done() const { return not_done(runs(), extra_from_, varied_, finer_not_done_); }
     std::vector<Run> runs() const { return {queue_->runs.begin(), queue_->runs.end()}; }
 
     void publish_now_and_then()
@@ -337,31 +312,38 @@ private:
         if (members >= enough_members && now() - published_at_ > std::max(10.0, 20 * publish_seconds_) && !over()) publish(false);
     }
 
-    void publish(bool final)
+    /// Nothing where no run is finished.
+    std::optional<Answer> publish(bool final)
     {
         const double begin = now();
-        const auto all = runs();
-        if (std::ranges::none_of(all, &Run::finished)) return;
-        Answer answer = answer_of(base_, all);
+        published_ = runs();
+        if (std::ranges::none_of(published_, &Run::finished)) return {};
+        Answer answer = answer_of(base_, published_);
         write_maps(base_, answer, points_, out_);
-        State state{
-            base_, args_.scene.file, all, within_, 0, group_, final, final ? not_done() : std::vector<Words>{}, not_modelled(base_)};
+        State state{base_,
+                    args_.scene.file,
+                    published_,
+                    within_,
+                    0,
+                    group_,
+                    final,
+                    final ? what_is_not_done() : std::vector<Words>{},
+                    not_modelled(base_)};
         state.ended = now();
         io::write_atomically(out_ / "report.html", html(state, answer, out_));
         io::write_atomically(out_ / "hazard.json", to_json(state, answer).dump(1) + "\n");
         publish_seconds_ = now() - begin, published_at_ = now();
         reserve_ = std::max(reserve_, 1.2 * publish_seconds_ + 0.3);
+        return answer;
     }
 
     Exit end()
     {
-        publish(true);
+        const auto answer = publish(true);
         const bool stopped = stop_->came();
         stop_.reset();
-        const auto all = runs();
-        const auto finished = std::ranges::count_if(all, &Run::finished);
-        if (finished == 0) {
-            for (const auto& line : not_done()) say("  not done: " + line.en);
+        if (!answer) {
+            for (const auto& line : what_is_not_done()) say("  not done: " + line.en);
             if (stopped) {
                 say("stopped on request before anything was finished; the same command goes on");
                 return Exit::Stopped;
@@ -371,15 +353,14 @@ private:
                             "goes on from here), fewer --layers",
                             args_.scene.file, seconds_text(within_)));
         }
-        const Answer answer = answer_of(base_, all);
-        say(fmt::format("\nreach {:.4g} m ({:.4g} to {:.4g} m) from the middle of the mass, of {} runs; resolution: {}", answer.likely,
-                        answer.low, answer.high, answer.counted.size(), answer.discretisation.how));
-        for (const auto& s : answer.sensitivity)
+        say(fmt::format("\nreach {:.4g} m ({:.4g} to {:.4g} m) from the middle of the mass, of {} runs; resolution: {}", answer->likely,
+                        answer->low, answer->high, answer->counted.size(), answer->discretisation.how));
+        for (const auto& s : answer->sensitivity)
             if (std::isfinite(s.correlation))
                 say(fmt::format("  {:<16} rank correlation with the reach {:+.2f} ({})", s.input, s.correlation,
                                 std::isfinite(s.interval[0]) ? fmt::format("{:+.2f} to {:+.2f}", s.interval[0], s.interval[1])
                                                              : "too few members for an interval"));
-        for (const auto& line : not_done()) say("  not done: " + line.en);
+        for (const auto& line : what_is_not_done()) say("  not done: " + line.en);
         say(fmt::format("{}after {} of {}: {}", stopped ? "stopped on request " : "", seconds_text(now()), seconds_text(within_),
                         (out_ / "report.html").string()));
         return stopped ? Exit::Stopped : Exit::Ok;
@@ -399,6 +380,7 @@ private:
     Json plan_;
     Words finer_not_done_;
     std::optional<Queue> queue_;
+    std::vector<Run> published_; // what the last answer points at
     std::optional<io::Ownership> owner_;
     std::optional<study::StopRequest> stop_;
 };

@@ -11,6 +11,7 @@ struct Arguments {
     SceneArguments scene;
     std::string output, within, layers, members_from;
     int members = 0, jobs = 0;
+    bool prepare = false; // write the scenes of all runs, for others to run
 };
 /// Throws BadInput, IoFailed.
 Exit run_hazard(const Comm&, const Arguments&);
@@ -29,6 +30,9 @@ struct State {
     std::vector<Words> not_done, not_modelled;
 };
 nlohmann::ordered_json to_json(const State&, const Answer&);
+/// What was meant to be done and was not, in words. Members from `extra_from` on (0: none) were only to fill the time; `no_finer`: why
+/// there was no finer run.
+std::vector<Words> not_done(const std::vector<Run>&, int extra_from, bool varied, const Words& no_finer);
 /// What no run of this scene has in it, in words.
 std::vector<Words> not_modelled(const Base&);
 

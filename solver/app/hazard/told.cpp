@@ -1,8 +1,10 @@
-// hazard.json, and what no run has in it.
+// hazard.json, what was not done, and what no run has in it.
 #include "io/ground/crs.hpp"
 #include "solver/app/hazard/runner.hpp"
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 namespace kuzure::hazard {
@@ -12,7 +14,60 @@ using Json = nlohmann::ordered_json;
 
 Json number(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
+/// "1 to 4, 7"
+std::string ranges_of(std::vector<int> numbers)
+{
+    std::sort(numbers.begin(), numbers.end());
+    std::vector<std::string> parts;
+    for (std::size_t k = 0; k < numbers.size();) {
+        std::size_t end = k + 1;
+        while (end < numbers.size() && numbers[end] == numbers[end - 1] + 1) ++end;
+        parts.push_back(
+            end - k > 2 ? fmt::format("{} to {}", numbers[k], numbers[end - 1])
+                        : fmt::format("{}", fmt::join(numbers.begin() + std::ptrdiff_t(k), numbers.begin() + std::ptrdiff_t(end), ", ")));
+        k = end;
+    }
+    return fmt::format("{}", fmt::join(parts, ", "));
+}
+
 } // namespace
+
+std::vector<Words> not_done(const std::vector<Run>& runs, int extra_from, bool varied, const Words& no_finer)
+{
+    std::vector<Words> all;
+    std::vector<int> waiting, failed;
+    std::vector<std::string> why;
+    for (const auto& r : runs) {
+        const bool waits = r.status == Status::NotRun || r.status == Status::Stopped;
+        if (r.part == Part::Member) {
+            const bool extra = extra_from > 0 && r.member.number >= extra_from;
+            if (waits && !extra) waiting.push_back(r.member.number);
+            if (r.status == Status::Failed || r.status == Status::Refused) {
+                failed.push_back(r.member.number);
+                if (std::ranges::find(why, r.message) == why.end() && why.size() < 3) why.push_back(r.message);
+            }
+        } else if (!r.finished()) {
+            const std::string more = r.message.empty() ? "" : ": " + r.message;
+            all.push_back({fmt::format("the run {} of {:.3g} layers: {}{}", r.directory.string(), r.layers,
+                                       waits ? "no time was left" : word(r.status), more),
+                           fmt::format("計算 {}({:.3g}層): {}{}", r.directory.string(), r.layers, waits ? "時間切れ" : "失敗", more)});
+        }
+    }
+    const auto some = [](const std::vector<int>& n) { return n.size() == 1 ? "member" : "members"; };
+    if (!failed.empty())
+        all.push_back({fmt::format("{} {} failed and {} not counted ({})", some(failed), ranges_of(failed),
+                                   failed.size() == 1 ? "is" : "are", fmt::join(why, "; ")),
+                       fmt::format("メンバー {} は失敗し、確率に数えていません({})", ranges_of(failed), fmt::join(why, "; "))});
+    if (!waiting.empty())
+        all.push_back({fmt::format("{} {}: no time was left", some(waiting), ranges_of(waiting)),
+                       fmt::format("メンバー {}: 時間切れ", ranges_of(waiting))});
+    if (!varied)
+        all.push_back({"no ensemble: the scene has no [uncertain], so the input's part in the uncertainty is unknown",
+                       "アンサンブルなし: シーンに [uncertain] がないため、入力の不確かさは含まれていません"});
+    if (!no_finer.en.empty() && std::ranges::none_of(runs, [](const Run& r) { return r.part == Part::Finer; }))
+        all.push_back({"no finer run: " + no_finer.en, "より細かい計算なし: " + no_finer.ja});
+    return all;
+}
 
 std::vector<Words> not_modelled(const Base& base)
 {
@@ -91,7 +146,7 @@ Json to_json(const State& st, const Answer& a)
         if (r.finished() && r.part != Part::Member) layers = std::max(layers, r.layers);
     }
     for (const auto* r : a.counted) layers = layers > 0 ? layers : r->layers;
-    const auto maps = maps_for(st.base.scene, st.base.coarsest);
+    const auto maps = maps_of_runs(st.base);
     Json j{{"title", st.base.scene.title},
            {"version", version_text()},
            {"scene", st.scene_file},

@@ -1,10 +1,12 @@
 #include "solver/app/scaling/job_plan.hpp"
+#include "solver/app/hazard/cluster.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <optional>
 
 namespace kuzure {
 
@@ -75,7 +77,10 @@ void choose_mode_and_queue(JobPlan& p, const JobArguments& a)
 JobPlan plan_job(const Comm& comm, const JobArguments& a)
 {
     JobPlan p;
-    const auto [scene, scene_warnings, filling] = a.scene.read(comm);
+    std::optional<hazard::ClusterRuns> runs;
+    if (a.hazard()) runs = hazard::cluster_runs(comm, a.scene, a.members, a.layers, a.output);
+    const auto checked = runs ? std::move(runs->largest) : a.scene.read(comm);
+    const auto& [scene, scene_warnings, filling] = checked;
     p.machine = machine_named(a.machine);
     const auto& m = p.machine;
     p.nodes = a.nodes, p.per_node = a.ranks_per_node > 0 ? a.ranks_per_node : m.node.ranks;
@@ -113,7 +118,8 @@ JobPlan plan_job(const Comm& comm, const JobArguments& a)
     }
     p.program = own_path();
     p.scene = std::filesystem::absolute(a.scene.file).lexically_normal();
-    p.results = std::filesystem::absolute(a.scene.results(scene, a.output)).lexically_normal();
+    p.results = std::filesystem::absolute(runs ? runs->directory : a.scene.results(scene, a.output)).lexically_normal();
+    if (runs) p.members = runs->members, p.layers = runs->layers;
     p.name = job_name(p.scene);
     return p;
 }

@@ -11,6 +11,9 @@ struct JobArguments {
     std::string machine, mode, queue, account, output;
     int nodes = 1, ranks_per_node = 0;
     double minutes = 0;
+    int members = 0;    // of a hazard; 0 with `layers`: what the scene says
+    std::string layers; // of its runs
+    bool hazard() const { return members > 0 || !layers.empty(); }
 };
 
 /// What the script asks for and why.
@@ -27,10 +30,12 @@ struct JobPlan {
     int jobs = 1;     // how many the run will probably take
     io::Path program, scene, results;
     std::string name;
+    int members = 0;    // of a hazard, whose runs are the tasks of an array; 0: one run
+    std::string layers; // of its runs
     bool clocked() const { return limit > 0; }
 };
 
-/// Collective. Throws BadInput for what the machine does not have.
+/// Of one run, or of a hazard's where the arguments say so. Collective. Throws BadInput for what the machine does not have.
 JobPlan plan_job(const Comm&, const JobArguments&);
 
 } // namespace kuzure

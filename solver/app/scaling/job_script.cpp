@@ -1,6 +1,7 @@
 #include "solver/app/scaling/job_script.hpp"
 #include "io/batch_template.hpp"
 #include "io/quote.hpp"
+#include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <fmt/format.h>
 
@@ -43,6 +44,11 @@ std::vector<std::string> about(const JobPlan& p)
     if (p.clocked())
         lines.push_back(fmt::format("{} a job, the last {} kept for the checkpoint: {}", duration_text(p.limit), duration_text(p.margin),
                                     p.jobs == 1 ? "one job should do" : fmt::format("about {} jobs", p.jobs)));
+    if (p.members > 0)
+        lines.push_back(
+            fmt::format("a task for each of {} members and the runs of the likely values, with {} layers (that is the finest above); "
+                        "bash SCRIPT on a login node",
+                        p.members, p.layers));
     for (auto& line : lines) line = io::comment_text(line);
     return lines;
 }
@@ -76,6 +82,7 @@ std::string job_script(const JobPlan& p, const JobArguments& a)
     for (const auto& set : a.scene.sets) options += "--set " + io::shell_word(set) + " ";
     if (a.scene.force_step) options += "--force-step ";
     word("options", options + fmt::format("--threads {}", p.threads));
+    if (p.members > 0) word("hazard", options + fmt::format("--members {} --layers {}", p.members, p.layers));
     std::string launch = filled(m.launcher, p);
     if (p.mode && !p.mode->wrapper.empty()) launch += " " + p.mode->wrapper;
     text("launch", launch), flag("launcher", !m.launcher.empty());
@@ -86,7 +93,14 @@ std::string job_script(const JobPlan& p, const JobArguments& a)
         for (const auto& line : p.mode->setup) setup.push_back(filled(line, p));
     for (const auto& line : m.directives) directives.push_back(filled(line, p));
     values["setup"] = {Lines, setup}, values["directive"] = {Options, directives}, values["about"] = {Lines, about(p)};
-    return io::fill_template(io::template_file(m.batch + ".job.sh", m.folders), values, m.folders);
+    const std::string name = m.batch + (p.members > 0 ? ".hazard.sh" : ".job.sh");
+    const auto file = io::template_file(name, m.folders);
+    if (file.empty())
+        throw BadInput(fmt::format("--members: {} has no template {} for the runs of a hazard as tasks of an array. Remedy: {}", m.name,
+                                   name,
+                                   m.batch == "none" ? "kuzure hazard, which runs them on this machine"
+                                                     : "write one beside the profile; slurm.hazard.sh shows how"));
+    return io::fill_template(file, values, m.folders);
 }
 
 } // namespace kuzure
