@@ -65,7 +65,7 @@ public:
     Exit go()
     {
         if (!args_.members_from.empty()) return answer_again(base_, args_, points_, out_);
-        require_ours();
+        study::require_own_directory(out_, "plan.json", "a hazard");
         fixed_spacing_ = !base_.scene.start.from.empty();
         begin_plan();
         // What cannot run shall not begin: the corners of what is uncertain are read as a run reads them.
@@ -103,19 +103,6 @@ private:
     bool over() const { return left() <= 0 || stop_->came(); }
 
     // ---- the directory
-
-    void require_ours() const
-    {
-        std::error_code error;
-        if (std::filesystem::exists(out_, error) && !std::filesystem::is_directory(out_, error))
-            throw BadInput(fmt::format("{}: expected a directory, found a file; choose another with -o DIR", out_.string()));
-        if (std::filesystem::is_directory(out_, error) && !std::filesystem::is_empty(out_, error) &&
-            !std::filesystem::exists(out_ / "plan.json", error))
-            throw BadInput(
-                fmt::format("{}: expected a new directory or that of a hazard, found one with other things in it; choose another "
-                            "with -o DIR",
-                            out_.string()));
-    }
 
     /// What makes runs those of one answer: scene, distributions, the coarsest run.
     std::string identity() const
