@@ -55,7 +55,7 @@ Scene scene_at(const Scene& scene, double time, const io::Path& state)
     scene::Event later;
     for (auto& b : s.bodies)
         if (!b.present) later.add.push_back(b.name), b.stress = scene::InitialStress::None; // what comes carries nothing
-    if (!later.add.empty()) s.events.push_back(later); // trial_scene() says when
+    if (!later.add.empty()) s.events.push_back(later);                                      // trial_scene() says when
     s.start.from = state.string();
     return s;
 }
