@@ -25,7 +25,7 @@ std::vector<std::string> notes_of(const Scene& s)
                                         soil.name, degrees(m.angle_of_the_stress_circle()), degrees(soil.friction_angle)));
         else if (soil.friction_angle > 0 && soil.dilation_angle < soil.friction_angle)
             notes.push_back(fmt::format("soil {}: with less dilation than friction the factor lies between {:.3f} and 1 of that of "
-                                        "associated flow, of which stability charts are (Davis 1968)",
+                                        "associated flow, which stability charts give (Davis 1968)",
                                         soil.name, std::cos(m.angle_of_the_stress_circle())));
         if (soil.softening)
             notes.push_back(fmt::format("soil {}: it softens; first and residual strength are both over F, and what softens on the way to "
