@@ -198,6 +198,12 @@ def refused(words, *args):
 
 refused(["--at", "event"], staged)
 refused(["--at"], slope, "--at", "-1")
+MOVED = """[[wall]]
+name = "plate"
+box = { low = [34.0, 0.0, 0.0], high = [38.0, 0.0, 8.0] }
+"""
+pushed = scene("pushed", body=MOVED, more='[[event]]\nfrom = 0.1\nto = 0.2\nmove = { wall = "plate", velocity = [1.0, 0.0, 0.0] }')
+refused(["--at 0.3", "plate", "moved"], pushed, "--at", "0.3")
 refused(["--bracket"], slope, "--bracket", "0")
 refused(["--bracket"], slope, "--bracket", "nan")
 refused(["--bracket"], slope, "--from", "1", "--to", "1.1", "--bracket", "0.2")

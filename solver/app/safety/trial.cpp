@@ -52,6 +52,11 @@ Scene scene_at(const Scene& scene, double time, const io::Path& state)
     Scene s = scene::stage_of(scene, int(begun), time);
     s.events.clear();
     std::erase_if(s.walls, [](const scene::Wall& w) { return !w.present; });
+    for (const auto& w : s.walls)
+        if (w.pose != scene::Pose{})
+            throw BadInput(fmt::format("--at {:g}: wall {} has been moved by then, and a trial's walls stand as they are drawn. Remedy: an "
+                                       "earlier time, or a scene with the wall where it stands then and start.from of this one's run",
+                                       time, w.name));
     scene::Event later;
     for (auto& b : s.bodies)
         if (!b.present) later.add.push_back(b.name), b.stress = scene::InitialStress::None; // what comes carries nothing

@@ -21,7 +21,7 @@ struct Setting {
 Setting setting_of(Scene, const scene::Filling&, const std::string& file);
 
 /// The scene at a time (s) of its own run, as one without events that starts from the state in `state`: what is not there by then comes
-/// when no trial runs any more.
+/// when no trial runs any more. Throws BadInput where a wall has been moved by then.
 Scene scene_at(const Scene&, double time, const io::Path& state);
 
 /// The scene of a trial. `start`: result directory of the state it starts from; empty: that of the base.
