@@ -219,6 +219,11 @@ SoilSnapshot read_snapshot(const Place& file)
     s.time = in.real(top, "time");
     std::vector<std::int32_t> kind;
     in.rows(data + "kind", 0, rows, 1, kind);
+    in.rows(data + "id", 0, rows, 1, s.id);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < rows; ++i)
+        if (kind[i] == 0) s.id[n++] = s.id[i];
+    s.id.resize(n);
     std::vector<double> values;
     const auto soil = [&](const std::string& name, int components, auto put) {
         in.rows(name, 0, rows, components, values);

@@ -32,7 +32,8 @@ void write_snapshot(const Team&, const Place& file, const Particles&, const Wall
 
 /// The soil of a snapshot, in the file's order.
 struct SoilSnapshot {
-    double time = 0;                            // s
+    double time = 0; // s
+    std::vector<std::int64_t> id;
     std::vector<Vector> position, displacement; // m; displacement only where the file has it
     std::vector<Stress> stress;                 // Pa; only where the file has it
 };

@@ -117,6 +117,7 @@ int main(int argc, char** argv)
     add_example(app, chosen);
     add_hazard(app, chosen);
     add_fit(app, chosen);
+    add_safety(app, chosen);
     add_terrain(app, chosen);
     add_reference(app, chosen);
     add_scale(app, chosen);

@@ -1,5 +1,6 @@
 #include "solver/scene/events.hpp"
 #include "solver/scene/motion.hpp"
+#include "solver/scene/strength.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -26,9 +27,6 @@ void move(double& a, const std::optional<double>& b, double share)
 {
     if (b) a = between(a, *b, share);
 }
-/// tan of an angle times a factor.
-double weaker(double angle, double factor) { return std::atan(factor * std::tan(angle)); }
-
 void change(Soil& soil, const SoilChange& c, double share)
 {
     move(soil.young, c.young, share), move(soil.poisson, c.poisson, share), move(soil.cohesion, c.cohesion, share);
@@ -37,12 +35,8 @@ void change(Soil& soil, const SoilChange& c, double share)
     if (c.cone) soil.cone = *c.cone;
     if (c.stiffness) soil.young *= between(1, *c.stiffness, share);
     if (!c.strength) return;
-    const double f = between(1, *c.strength, share);
-    soil.cohesion *= f, soil.friction_angle = weaker(soil.friction_angle, f);
+    scale_strength(soil, between(1, *c.strength, share));
     soil.dilation_angle = std::min(soil.dilation_angle, soil.friction_angle);
-    if (soil.tension_cutoff) *soil.tension_cutoff *= f;
-    if (auto& s = soil.softening) s->cohesion *= f, s->friction_angle = weaker(s->friction_angle, f);
-    if (auto& r = soil.rate_friction) r->friction_angle = weaker(r->friction_angle, f);
 }
 
 /// Acceleration (m/s^2) of the ground at a time of its record (s); none before and after it.

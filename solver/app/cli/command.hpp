@@ -44,6 +44,7 @@ void add_job(CLI::App&, Action& chosen);
 void add_study(CLI::App&, Action& chosen);
 void add_hazard(CLI::App&, Action& chosen);
 void add_fit(CLI::App&, Action& chosen);
+void add_safety(CLI::App&, Action& chosen);
 void add_terrain(CLI::App&, Action& chosen);
 void add_example(CLI::App&, Action& chosen);
 void add_surface(CLI::App&, Action& chosen);

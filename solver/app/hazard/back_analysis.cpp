@@ -5,6 +5,7 @@
 #include "io/owner.hpp"
 #include "solver/app/hazard/directory.hpp"
 #include "solver/app/hazard/plan.hpp"
+#include "solver/app/study/runs.hpp"
 #include "solver/core/wall_clock.hpp"
 #include "solver/scene/ground.hpp"
 #include <algorithm>
@@ -56,7 +57,7 @@ public:
 
     Exit go()
     {
-        require_ours(out_, mark, "fit");
+        study::require_own_directory(out_, mark, "a fit");
         begin_plan();
         // What cannot run shall not begin: both ends are read as a run reads them.
         base_.coarsest = spacing_;

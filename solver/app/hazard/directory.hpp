@@ -7,8 +7,6 @@ namespace kuzure::hazard {
 
 /// What was asked for, or the scene's output directory and "-what", or results/FILE-what.
 io::Path directory_for(const std::string& asked, const Scene&, const std::string& scene_file, const std::string& what);
-/// Throws BadInput where it is a file, or a directory with other things than an answer that left `mark` in it.
-void require_ours(const io::Path& directory, const std::string& mark, const std::string& what);
 /// The directory with what its runs need: scenes, inputs, logs and `runs`.
 void make_directories(const io::Path& directory, const std::string& runs);
 

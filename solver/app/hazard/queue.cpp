@@ -1,5 +1,4 @@
 #include "solver/app/hazard/queue.hpp"
-#include "io/owner.hpp"
 #include "io/quote.hpp"
 #include "solver/core/wall_clock.hpp"
 #include <algorithm>
@@ -12,20 +11,6 @@
 namespace kuzure::hazard {
 namespace {
 
-/// The last line that a child said.
-std::string last_words(const io::Path& log)
-{
-    std::string text;
-    try {
-        text = io::read_text(log);
-    } catch (const IoFailed& e) {
-        return e.what();
-    }
-    while (!text.empty() && text.back() == '\n') text.pop_back();
-    text = text.substr(text.rfind('\n') + 1);
-    return text.starts_with("kuzure: ") ? text.substr(8) : text;
-}
-
 /// The name of a run as one of a file.
 std::string flat(const Run& r)
 {
@@ -35,14 +20,6 @@ std::string flat(const Run& r)
 }
 
 } // namespace
-
-void say(const std::string& text)
-{
-    fmt::print("{}\n", text);
-    std::fflush(stdout);
-}
-
-std::string seconds_text(double s) { return s < 100 ? fmt::format("{:.1f} s", s) : fmt::format("{:.1f} min", s / 60); }
 
 Run& Queue::add(Part part, Member m, double spacing, const std::string& name)
 {
@@ -89,14 +66,7 @@ void Queue::take_what_is_there(Run& r) const
     const io::Path where = out_ / r.directory;
     std::error_code error;
     if (!std::filesystem::is_directory(where, error)) return;
-    for (int k = 0; k < 100; ++k) {
-        try {
-            io::Ownership::refuse_if_owned(io::hold(where));
-            break;
-        } catch (const BadInput&) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(200));
-        }
-    }
+    study::wait_for_the_end_of_a_run(where);
     try {
         const auto j = nlohmann::json::parse(io::read_text(where / "summary.json"));
         if (j.at("status") == "finished") {
@@ -109,9 +79,7 @@ void Queue::take_what_is_there(Run& r) const
         r.status = Status::NotRun;
     }
     // Without a checkpoint it begins anew, and kuzure would move aside what it had begun.
-    if (r.status == Status::NotRun && !std::filesystem::exists(where / "checkpoint.h5", error) &&
-        !std::filesystem::exists(where / "checkpoint.prev.h5", error))
-        std::filesystem::remove_all(where, error);
+    if (r.status == Status::NotRun && !study::has_checkpoint(where)) std::filesystem::remove_all(where, error);
 }
 
 void Queue::finish(Run& r) const
@@ -196,7 +164,7 @@ void Queue::conclude(Run& r, const study::ChildResult& ended) const
         }
         break;
     case 2:
-        r.status = Status::Refused, r.message = last_words(log);
+        r.status = Status::Refused, r.message = study::last_words(log);
         break;
     case 5:
     case 128 + SIGTERM:
@@ -206,7 +174,7 @@ void Queue::conclude(Run& r, const study::ChildResult& ended) const
         break;
     default:
         r.status = Status::Failed, r.message = ended.exit_code == 3 || ended.exit_code == 4
-                                                   ? last_words(log)
+                                                   ? study::last_words(log)
                                                    : fmt::format("ended with exit code {}", ended.exit_code);
     }
     if (r.finished())

@@ -3,15 +3,13 @@
 // begun goes on from its checkpoint.
 #include "solver/app/hazard/answer.hpp"
 #include "solver/app/study/child.hpp"
+#include "solver/app/study/runs.hpp"
 #include <deque>
 #include <functional>
 
 namespace kuzure::hazard {
 
-/// A line for the user, on standard output.
-void say(const std::string&);
-/// "12.3 s", "45.6 min"
-std::string seconds_text(double seconds);
+using study::say, study::seconds_text;
 
 class Queue {
 public:

@@ -5,6 +5,7 @@
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/hazard/queue.hpp"
 #include "solver/app/run/maps.hpp"
+#include "solver/app/study/runs.hpp"
 #include "solver/core/wall_clock.hpp"
 #include <algorithm>
 #include <cmath>
@@ -57,7 +58,7 @@ public:
     Exit go()
     {
         if (!args_.members_from.empty()) return answer_again(base_, args_, points_, out_);
-        require_ours(out_, "plan.json", "hazard");
+        study::require_own_directory(out_, "plan.json", "a hazard");
         fixed_spacing_ = !base_.scene.start.from.empty();
         begin_plan();
         // What cannot run shall not begin: the corners of what is uncertain are read as a run reads them.

@@ -1,6 +1,7 @@
 #include "solver/app/study/runner.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/study/child.hpp"
+#include "solver/app/study/runs.hpp"
 #include "solver/app/study/study.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
@@ -14,12 +15,6 @@ namespace kuzure::study {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-void say(const std::string& text)
-{
-    fmt::print("{}\n", text);
-    std::fflush(stdout);
-}
 
 /// What point.json says of a run that was done before, where it is the same run.
 bool take_what_is_there(const io::Path& folder, Point& p)
@@ -165,11 +160,7 @@ private:
         p.exit_code = child.exit_code, p.core_seconds = child.core_seconds;
         // Only the results count: a checkpoint of each of many points would fill the disk.
         for (const char* name : {"checkpoint.h5", "checkpoint.prev.h5"}) std::filesystem::remove(here / "run" / name, error);
-        if (p.exit_code != 0) {
-            std::string log = io::read_text(here / "log.txt");
-            while (!log.empty() && log.back() == '\n') log.pop_back();
-            p.message = log.substr(log.rfind('\n') + 1);
-        }
+        if (p.exit_code != 0) p.message = last_words(here / "log.txt");
         io::write_atomically(here / "point.json", Json{{"scene_hash", p.hash},
                                                        {"end", p.scene->time.end},
                                                        {"exit_code", p.exit_code},
