@@ -264,6 +264,41 @@ std::string curve_csv(const BackState& s)
     return text;
 }
 
+Json run_json(const BackState& s, const Tried& one)
+{
+    const auto& c = one.compared;
+    Json settings = Json::object();
+    for (std::size_t k = 0; k < s.axes.size(); ++k) settings[s.axes[k].name] = s.axes[k].value(one.at[k]);
+    Json j{
+        {"directory", one.run->directory.string()}, {"status", word(one.run->status)}, {"settings", settings}, {"layers", one.run->layers}};
+    if (one.run->finished()) {
+        j["misfit"] = c.misfit, j["overlap"] = c.overlap, j["reach"] = c.reach, j["reach_error"] = c.reach_error, j["area"] = c.area;
+        j["area_error"] = c.area / s.observed.area - 1;
+        if (s.observed.deposit) j["rms_thickness"] = c.rms;
+    }
+    if (!one.run->message.empty()) j["message"] = one.run->message;
+    return j;
+}
+/// What is listed in fit.json, by its name there.
+Json lists_of(const BackState& s)
+{
+    Json inputs = Json::array(), misfit = Json::array(), runs = Json::array(), twins = Json::array(), not_done = Json::array(),
+         says = Json::array();
+    for (const auto& a : s.axes) inputs.push_back({{"name", a.name}, {"unit", a.unit}, {"low", a.low}, {"high", a.high}});
+    for (const auto& one : in_order(s.tried)) {
+        runs.push_back(run_json(s, one));
+        if (!one.run->finished()) continue;
+        Json row = Json::array();
+        for (std::size_t k = 0; k < s.axes.size(); ++k) row.push_back(s.axes[k].value(one.at[k]));
+        row.push_back(one.compared.misfit);
+        misfit.push_back(row);
+    }
+    for (const auto& one : s.twins) twins.push_back(run_json(s, one));
+    for (const auto& w : s.not_done) not_done.push_back(w.en);
+    for (const auto& w : meaning(s)) says.push_back(w.en);
+    return {{"inputs", inputs}, {"misfit", misfit}, {"runs", runs}, {"particles_elsewhere", twins}, {"not_done", not_done}, {"says", says}};
+}
+
 Json to_json(const BackState& s)
 {
     const auto& v = *s.verdict;
@@ -273,36 +308,7 @@ Json to_json(const BackState& s)
         for (std::size_t k = 0; k < s.axes.size(); ++k) j[s.axes[k].name] = value_of(k);
         return j;
     };
-    const auto compared = [&](const Tried& one) {
-        const auto& c = one.compared;
-        Json settings = Json::object();
-        for (std::size_t k = 0; k < s.axes.size(); ++k) settings[s.axes[k].name] = s.axes[k].value(one.at[k]);
-        Json j{{"directory", one.run->directory.string()},
-               {"status", word(one.run->status)},
-               {"settings", settings},
-               {"layers", one.run->layers}};
-        if (one.run->finished()) {
-            j["misfit"] = c.misfit, j["overlap"] = c.overlap, j["reach"] = c.reach, j["reach_error"] = c.reach_error, j["area"] = c.area;
-            j["area_error"] = c.area / s.observed.area - 1;
-            if (s.observed.deposit) j["rms_thickness"] = c.rms;
-        }
-        if (!one.run->message.empty()) j["message"] = one.run->message;
-        return j;
-    };
-    Json inputs = Json::array(), misfit = Json::array(), runs = Json::array(), twins = Json::array(), not_done = Json::array(),
-         says = Json::array();
-    for (const auto& a : s.axes) inputs.push_back({{"name", a.name}, {"unit", a.unit}, {"low", a.low}, {"high", a.high}});
-    for (const auto& one : in_order(s.tried)) {
-        runs.push_back(compared(one));
-        if (!one.run->finished()) continue;
-        Json row = Json::array();
-        for (std::size_t k = 0; k < s.axes.size(); ++k) row.push_back(s.axes[k].value(one.at[k]));
-        row.push_back(one.compared.misfit);
-        misfit.push_back(row);
-    }
-    for (const auto& one : s.twins) twins.push_back(compared(one));
-    for (const auto& w : s.not_done) not_done.push_back(w.en);
-    for (const auto& w : meaning(s)) says.push_back(w.en);
+    Json lists = lists_of(s);
     const auto open = [&](std::size_t k) {
         Json j = Json::array();
         if (v.intervals[k].open_low) j.push_back("low");
@@ -320,7 +326,7 @@ Json to_json(const BackState& s)
               {"area", s.observed.area},
               {"reach", s.observed.reach},
               {"doubts", s.observed.doubts}}},
-            {"inputs", inputs},
+            {"inputs", lists["inputs"]},
             {"best", one_or_all([&](std::size_t k) { return s.axes[k].value(v.best[k]); })},
             {"interval", v.at_end ? Json() : one_or_all([&](std::size_t k) {
                  return Json{v.intervals[k].low, v.intervals[k].high};
@@ -328,26 +334,26 @@ Json to_json(const BackState& s)
             {"interval_ends_with_range", v.at_end ? Json() : one_or_all(open)},
             {"at_end_of_range", v.at_end},
             {"more_than_one_answer", v.split},
-            {"misfit", misfit},
-            {"best_run", compared(s.best())},
+            {"misfit", lists["misfit"]},
+            {"best_run", run_json(s, s.best())},
             {"alike", {{"misfit", s.alike}, {"cells", s.of_cells}, {"curve", s.of_curve}, {"particles", number(s.of_twins)}}},
             {"moving_at_end", s.moving},
-            {"says", says},
+            {"says", lists["says"]},
             {"layers", s.layers},
             {"spacing", s.spacing},
             {"cell", s.cell},
             {"wet", s.wet},
             {"crs", s.base.scene.map_frame.crs.empty() ? Json() : Json(io::crs_name(s.base.scene.map_frame.crs))},
             {"ended_seconds", s.ended},
-            {"not_done", not_done},
+            {"not_done", lists["not_done"]},
             {"not_modelled",
              [&] {
                  Json list = Json::array();
                  for (const auto& w : not_modelled(s.base)) list.push_back(w.en);
                  return list;
              }()},
-            {"runs", runs},
-            {"particles_elsewhere", twins}};
+            {"runs", lists["runs"]},
+            {"particles_elsewhere", lists["particles_elsewhere"]}};
 }
 
 std::string html(const BackState& s, const io::Path& directory)

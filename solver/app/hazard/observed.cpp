@@ -85,6 +85,34 @@ bool is_outline(const io::Path& file)
     return ending == ".shp" || ending == ".geojson" || ending == ".json";
 }
 
+/// Throws BadInput for an event beside the map; notes what is doubtful.
+void look_where_it_lies(Observed& o, const Base& base, const scene::Filling& filling)
+{
+    const auto grid = scene::map_grid(base.scene, filling);
+    const auto& f = base.scene.map_frame;
+    const double x0 = grid.x + f.x, y0 = grid.y + f.y, x1 = x0 + double(grid.columns) * grid.cell, y1 = y0 + double(grid.rows) * grid.cell;
+    Box box;
+    box.hold(o.rings);
+    const std::string where = fmt::format("it reaches from ({:.10g}, {:.10g}) to ({:.10g}, {:.10g}), the map from ({:.10g}, {:.10g}) to "
+                                          "({:.10g}, {:.10g})",
+                                          box.low_x, box.low_y, box.high_x, box.high_y, x0, y0, x1, y1);
+    if (box.low_x >= x1 || box.high_x <= x0 || box.low_y >= y1 || box.high_y <= y0)
+        throw BadInput(
+            fmt::format("--observed: {}: expected an event on the scene's map, found one beside it: {}. Remedy: is it of another "
+                        "place, or of another coordinate system than it says?",
+                        o.file, where));
+    const double hair = 1e-6 * grid.cell;
+    if (box.low_x < x0 - hair || box.high_x > x1 + hair || box.low_y < y0 - hair || box.high_y > y1 + hair)
+        o.doubts.push_back(
+            fmt::format("{}: part of it lies beyond the scene's map and counts as missed by every run ({}). Remedy: a larger "
+                        "terrain.window, or larger walls",
+                        o.file, where));
+    if (!o.deposit && !scene::encloses(o.rings, f.x + base.centre.x, f.y + base.centre.y))
+        o.doubts.push_back(fmt::format("{}: the middle of the mass lies outside of it. It should hold all that was reached, with where the "
+                                       "mass came from: else every run is charged for that",
+                                       o.file));
+}
+
 } // namespace
 
 Observed read_observed(const std::string& file, const Base& base, const scene::Filling& filling, double wet)
@@ -134,29 +162,7 @@ Observed read_observed(const std::string& file, const Base& base, const scene::F
             o.perimeter += std::hypot(next[0] - ring[k][0], next[1] - ring[k][1]);
         }
 
-    const auto grid = scene::map_grid(base.scene, filling);
-    const auto& f = base.scene.map_frame;
-    const double x0 = grid.x + f.x, y0 = grid.y + f.y, x1 = x0 + double(grid.columns) * grid.cell, y1 = y0 + double(grid.rows) * grid.cell;
-    Box box;
-    box.hold(o.rings);
-    const std::string where = fmt::format("it reaches from ({:.10g}, {:.10g}) to ({:.10g}, {:.10g}), the map from ({:.10g}, {:.10g}) to "
-                                          "({:.10g}, {:.10g})",
-                                          box.low_x, box.low_y, box.high_x, box.high_y, x0, y0, x1, y1);
-    if (box.low_x >= x1 || box.high_x <= x0 || box.low_y >= y1 || box.high_y <= y0)
-        throw BadInput(
-            fmt::format("--observed: {}: expected an event on the scene's map, found one beside it: {}. Remedy: is it of another "
-                        "place, or of another coordinate system than it says?",
-                        file, where));
-    const double hair = 1e-6 * grid.cell;
-    if (box.low_x < x0 - hair || box.high_x > x1 + hair || box.low_y < y0 - hair || box.high_y > y1 + hair)
-        o.doubts.push_back(
-            fmt::format("{}: part of it lies beyond the scene's map and counts as missed by every run ({}). Remedy: a larger "
-                        "terrain.window, or larger walls",
-                        file, where));
-    if (!o.deposit && !scene::encloses(o.rings, f.x + base.centre.x, f.y + base.centre.y))
-        o.doubts.push_back(fmt::format("{}: the middle of the mass lies outside of it. It should hold all that was reached, with where the "
-                                       "mass came from: else every run is charged for that",
-                                       file));
+    look_where_it_lies(o, base, filling);
     return o;
 }
 
