@@ -82,6 +82,13 @@ int decimals(const std::vector<State>& states)
     return std::isfinite(gap) ? std::clamp(int(std::ceil(-std::log10(gap) - 1e-6)), 2, 9) : 3;
 }
 
+/// True where events change walls, and every snapshot has its own.
+bool have_walls_of_their_time(const Place& state)
+{
+    const std::lock_guard lock(hdf5);
+    return H5Reader(state).has_attribute("/VTKHDF", "walls_change");
+}
+
 std::vector<Vector> walls_of(const Place& state)
 {
     const Place alone = state.beside("walls.hdf");
@@ -274,7 +281,7 @@ private:
         if (mine.empty()) return;
         const auto walls = walls_of(first_file_);
         // Walls that events change are in every snapshot.
-        const bool walls_change = !exists(first_file_.beside("walls.hdf")) && !walls.empty();
+        const bool walls_change = have_walls_of_their_time(first_file_);
         const Look look{frame_of(all, reach_of(walls, {}).all, task_.dimensions, task_.spacing),
                         color_range(all, color_->has_signs(), task_.range)};
         const Painter painter = painter_with(look, walls);

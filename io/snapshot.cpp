@@ -125,6 +125,7 @@ private:
         out_.attribute(top, "time_unit", "s");
         out_.attribute(top, "title", label_.title);
         if (label_.failed) out_.attribute(top, "failed_particle", *label_.failed);
+        if (label_.walls_change) out_.attribute(top, "walls_change", std::int64_t(1));
     }
 
     /// One partition: its sizes, the vertices as cells.

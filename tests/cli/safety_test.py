@@ -99,11 +99,13 @@ slope = scene("slope")
 WIDE = ("--from", "0.8", "--to", "2", "--bracket", "0.04")
 call(slope, "-o", "one", "--jobs", "1", *WIDE)
 one = answer("one")
-check(one["low"] < one["factor"] < one["high"] and one["high"] - one["low"] < 0.0401, f"a bracket: {one['low']} to {one['high']}")
+check(
+    one["stands"] < one["factor"] < one["fails"] and one["fails"] - one["stands"] < 0.0401, f"a bracket: {one['stands']} to {one['fails']}"
+)
 check(abs(one["factor"] - 1.38) < 0.05 * 1.38, f"the chart's 1.38 within 5 % at ten spacings: {one['factor']}")
 outcomes = {t["factor"]: t["outcome"] for t in one["trials"]}
 check(
-    all(o == ("holds" if f <= one["low"] else "fails") for f, o in outcomes.items()) and len(outcomes) == len(one["trials"]),
+    all(o == ("holds" if f <= one["stands"] else "fails") for f, o in outcomes.items()) and len(outcomes) == len(one["trials"]),
     f"every trial below holds, every one above fails: {outcomes}",
 )
 moved = [t["displacement"] for t in one["trials"] if t["outcome"] == "holds"]
@@ -121,7 +123,7 @@ check(len(rows("one")) == len(one["trials"]), "safety.csv has every trial")
 # ---- the same by any way
 call(slope, "-o", "two", "--jobs", "2", *WIDE)
 two = answer("two")
-check((two["low"], two["high"]) == (one["low"], one["high"]), "two trials at a time: the same bracket")
+check((two["stands"], two["fails"]) == (one["stands"], one["fails"]), "two trials at a time: the same bracket")
 # The trial that goes on for the picture has more looks; those of both calls are the same.
 common = rows("one").keys() & rows("two").keys()
 check(len(common) >= 5 and all(rows("one")[f] == rows("two")[f] for f in common), "and the same numbers of the trials of both")
@@ -133,7 +135,7 @@ check(again.stdout.count("there already") == len(one["trials"]) and table("one")
 mirrored = scene("mirrored", mirrored=True)
 call(mirrored, "-o", "mirrored", *WIDE)
 other = answer("mirrored")
-check((other["low"], other["high"]) == (one["low"], one["high"]), f"the mirrored slope: {other['low']} to {other['high']}")
+check((other["stands"], other["fails"]) == (one["stands"], one["fails"]), f"the mirrored slope: {other['stands']} to {other['fails']}")
 
 # Soil twice as strong has twice the factor: here on a grid of its own.
 strong = scene("strong", cohesion=20e3, tangent=2 * math.tan(math.radians(20)))
@@ -162,13 +164,13 @@ check(stopped.returncode == 5 and "goes on from here" in said, f"a stop: exit {s
 above = call(slope, "-o", "above", "--to", "1.1", "--bracket", "0.2")
 beyond = answer("above")
 check(
-    "above 1.1" in above.stdout and beyond["factor"] is None and beyond["low"] == 1.1 and beyond["high"] is None,
+    "above 1.1" in above.stdout and beyond["factor"] is None and beyond["stands"] == 1.1 and beyond["fails"] is None,
     "it holds in all the range",
 )
 below = call(slope, "-o", "below", "--from", "1.6", "--to", "2", "--bracket", "0.2")
 beyond = answer("below")
 check(
-    "below 1.6" in below.stdout and beyond["factor"] is None and beyond["high"] == 1.6 and beyond["low"] is None,
+    "below 1.6" in below.stdout and beyond["factor"] is None and beyond["fails"] == 1.6 and beyond["stands"] is None,
     "it fails in all the range",
 )
 
@@ -183,9 +185,10 @@ staged = scene("staged", body=BERM, more='[[event]]\nat = 0.2\nremove = "berm"')
 call(staged, "-o", "with", "--at", "0.1", "--bracket", "0.1")
 call(staged, "-o", "without", "--at", "0.3", "--bracket", "0.1")
 propped, free = answer("with"), answer("without")
-check(propped["low"] >= free["high"], f"the berm holds the slope: {propped['factor']} with it, {free['factor']} without")
+check(propped["stands"] >= free["fails"], f"the berm holds the slope: {propped['factor']} with it, {free['factor']} without")
 check(
-    free["low"] <= one["high"] and free["high"] >= one["low"], f"without it the slope is the first one's: {free['low']} to {free['high']}"
+    free["stands"] <= one["fails"] and free["fails"] >= one["stands"],
+    f"without it the slope is the first one's: {free['stands']} to {free['fails']}",
 )
 
 

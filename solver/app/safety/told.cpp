@@ -42,7 +42,7 @@ Json to_json(const Told& t)
     const auto number = [](const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); };
     Json j;
     j["scene"] = t.scene_file, j["version"] = version_text();
-    j["factor"] = number(t.answer.factor()), j["low"] = number(t.answer.holds), j["high"] = number(t.answer.fails);
+    j["factor"] = number(t.answer.factor()), j["stands"] = number(t.answer.holds), j["fails"] = number(t.answer.fails);
     j["answer"] = t.answer.words();
     if (t.at) j["at"] = *t.at;
     j["criterion"] = {{"words", criterion(t.setting)}, {"unbalanced_at_rest", at_rest}, {"displacement_limit", t.setting.limit},
