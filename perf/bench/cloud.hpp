@@ -62,7 +62,10 @@ struct Cloud {
                     p[field::id].set(i, std::int64_t(i));
                 }
         for (int w = 0; w < int(s.walls.size()); ++w) {
-            const scene::Lattice lattice(s.walls[std::size_t(w)].shape, dx, s.dimensions);
+            const auto& shape = s.walls[std::size_t(w)].shape;
+            const auto* ground = std::get_if<scene::Ground>(&shape);
+            const auto lattice =
+                ground ? scene::Points(scene::Draped(*ground, dx)) : scene::Points(scene::Lattice(shape, dx, s.dimensions));
             auto& points = walls.emplace_back();
             points.wall = w;
             for (std::int64_t k = 0; k < lattice.size(); ++k) {

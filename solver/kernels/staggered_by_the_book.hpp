@@ -8,12 +8,15 @@
 //              sigma, rho by a whole step: half of the loading before the turn and half after
 //     force    a_i = b_i + g + 1/rho_i sum_j V_j [sigma_i + sigma_j + f^n (tau_i + tau_j)] . grad W
 //                    + 1/rho_i sum_w V_w 2 P_w (sigma_i . grad W) + friction;  v_i += dt/2 a_i
+//              of soil behind the face of real ground that its nearest point there mirrors it at, by a depth of d: also
+//              a spring n omega^2 d, omega = 0.3 c_p/h
 //
 // A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
 // nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's. Where the wall of that face
 // moves, v_i less the velocity of the face takes the place of v_i, and its power counts apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
+#include "solver/scene/height_field.hpp"
 #include <algorithm>
 
 namespace kuzure::book {
@@ -102,6 +105,9 @@ inline std::vector<OnFace> nearest_on_each_face(const scene::Shape& shape, Vecto
         }
         if (dimensions == 3 && scene::contains(*p, {x.x, (p->y[0] + p->y[1]) / 2, x.z}))
             for (const int end : {0, 1}) all.push_back({{x.x, p->y[std::size_t(end)], x.z}, {0, end ? 1.0 : -1.0, 0}});
+    } else if (const auto* g = std::get_if<scene::Ground>(&shape)) {
+        const auto nearest = g->field->nearest(x);
+        if (std::isfinite(nearest.distance)) all.push_back({nearest.point, (1 / nearest.distance) * (x - nearest.point)});
     }
     return all;
 }
@@ -329,6 +335,11 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     double held_power[2] = {}, push_power[2] = {}; // of walls in this step and the next, W/m^3
     Vector carried[2] = {};                        // sum of face areas times their velocities
     double all_faces = 0;
+    struct {
+        double distance;
+        Vector push{};   // m/s^2
+        double grip = 0; // tan(friction angle) of a Coulomb face
+    } out{2 * s.how.h};  // of real ground, at the wall point nearest to i
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         const Vector x_ij = i.x - soil.x[l];
         if (l == k || length(x_ij) >= 2 * s.how.h) continue;
@@ -346,6 +357,12 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         ++of_i.pairs;
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
+        if (length(r) < out.distance) {
+            const double sunk = std::holds_alternative<scene::Ground>(wall.shape) ? std::max(face.depth - dot(r, face.normal), 0.0) : 0.0;
+            const double omega = 0.3 * material.c_p / s.how.h;
+            out = {length(r), (omega * omega * sunk) * face.normal,
+                   wall.surface == scene::Surface::Coulomb ? std::tan(wall.friction_angle) : 0.0};
+        }
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
         const Vector v_w[2] = {velocity_of(w, face, s.motion), velocity_of(w, face, s.next_motion)};
         for (int t = 0; t < 2; ++t)
@@ -361,14 +378,14 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         for (int t = 0; t < 2; ++t) carried[t] = carried[t] + facing * v_w[t];
         all_faces += facing;
     }
-    Vector by_walls = (1 / i.density) * held;
+    Vector by_walls = (1 / i.density) * held + out.push;
     double power[2] = {held_power[0] / i.density, held_power[1] / i.density};
     // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
     // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (length(area) > 0) {
         of_i.contact = limit > 0 ? Forced::Contact::Presses : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
         const bool felt = of_i.contact != Forced::Contact::LetGo;
-        const double lag = 4 * s.how.h / material.c_p, presses = felt ? limit / i.density : 0;
+        const double lag = 4 * s.how.h / material.c_p, presses = (felt ? limit / i.density : 0) + length(out.push) * out.grip;
         of_i.pressed = limit > 0 ? length(push) / i.density : 0;
         of_i.friction = kept.friction + (dt > 0 ? dt / (lag + dt) : 1) * presses;
         if (felt) by_walls = by_walls + (1 / i.density) * push;

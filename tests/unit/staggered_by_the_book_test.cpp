@@ -379,6 +379,38 @@ TEST(StaggeredByTheBook, EveryModelBesideWallsOfEveryShapeAndSurface)
     for (const auto rub : {Forced::Rubs::Not, Forced::Rubs::Sticks, Forced::Rubs::Slides}) EXPECT_GT(rubs[int(rub)], 50) << int(rub);
 }
 
+TEST(StaggeredByTheBook, RealGroundHoldsSunkSoilOut)
+{
+    const double e = edge(3), cell = 1.3 * dx;
+    scene::Grid heights{-8 * dx, -8 * dx, cell, 20, 20, {}};
+    for (int row = 0; row < heights.rows; ++row)
+        for (int column = 0; column < heights.columns; ++column)
+            heights.values.push_back(1.2 * dx * std::sin(heights.x_of(column) / (3 * dx)) + 0.4 * heights.y_of(row) - 0.1 * e);
+    const scene::Ground ground{std::make_shared<scene::HeightField>(heights), 5 * dx};
+    int sunk = 0;
+    for (const Scene& bare : scenes(staggered)) {
+        if (bare.dimensions == 2) continue;
+        for (int surface = 0; surface < 3; ++surface)
+            for (const auto arranged : {Disorder, Soils}) {
+                Scene s = bare;
+                s.walls = {{ground, scene::Surface(surface), surface == 2 ? 0.4 : 0.0}};
+                const Cloud c = cloud(arranged, s);
+                for (Index i = 0; i < c.particles.size(); ++i)
+                    sunk += scene::signed_distance(ground, std::as_const(c.particles)[field::position][i]) < 0;
+                const Read read = by_the_book(c);
+                expect_by_the_book(c, read, std::string(surfaces[surface]) + " ground, " + arrangements[arranged]);
+                if (surface == 0 || arranged == Soils) continue;
+                // the control: how deep soil has sunk below the face
+                const auto deeper = [](book::GroundPoint& w) {
+                    for (auto& f : w.faces) f.depth *= 1.01;
+                };
+                const auto off = difference(c, passed(c, Arithmetic::Simd, read), by_the_book(c, nullptr, {.of_wall = deeper}));
+                EXPECT_GT(off.acceleration, 10 * rough) << surfaces[surface];
+            }
+    }
+    EXPECT_GT(sunk, 500);
+}
+
 TEST(StaggeredByTheBook, WallsThatMove)
 {
     const auto moved = [](Scene s, const std::vector<double>& factors) {
