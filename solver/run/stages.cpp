@@ -78,17 +78,16 @@ void Simulation::require_room(const Scene& before)
     double deepest = 0;
     std::int64_t id = -1;
     std::string piece;
-    const auto find_deepest = [&](const scene::Shape& shape, int own_body, const std::string& name) {
+    const auto find_deepest = [&](const auto& part, int own_body, const std::string& name) {
         for (Index i = 0; i < particles_.size(); ++i) {
             const std::int64_t particle = std::as_const(particles_)[field::id][i];
-            const double depth = -scene::signed_distance(shape, std::as_const(particles_)[field::position][i], scene_.dimensions);
+            const double depth = -scene::signed_distance(part, std::as_const(particles_)[field::position][i], scene_.dimensions);
             if (!(depth > deepest) || (own_body >= 0 && !before.bodies[std::size_t(filling_.body_of(particle))].present)) continue;
             deepest = depth, id = particle, piece = name;
         }
     };
     for (std::size_t w = 0; w < scene_.walls.size(); ++w)
-        if (!before.walls[w].present && scene_.walls[w].present)
-            find_deepest(scene_.walls[w].shape, -1, scene::name_of_wall(scene_, int(w)));
+        if (!before.walls[w].present && scene_.walls[w].present) find_deepest(scene_.walls[w], -1, scene::name_of_wall(scene_, int(w)));
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
         if (!before.bodies[b].present && scene_.bodies[b].present)
             find_deepest(scene_.bodies[b].shape, int(b), scene::name_of_body(scene_, int(b)));

@@ -223,6 +223,18 @@ surface = "smooth"
     check(max(map(abs, excess)) < 2e-3 * largest, f"the ledger closes: {max(map(abs, excess)) / largest:.1e}")
 
 
+def added():
+    """A wall that has been moved before it is added stands where it was moved to."""
+    plate = """[[wall]]
+name = "late"
+box = { low = [5.0, 0.0, 0.0], high = [5.4, 0.0, 1.6] }
+"""
+    add = '[[event]]\nat = 0.1\nadd = "late"\n'
+    text = tray(end=0.15, far=5.0, more=plate + move("late", (-40.0, 0.0, 0.0), 0.0, 0.1) + add)
+    done = run(scene("into", text), "into", expect=3)
+    check("wall late is added" in done.stderr and "where soil stands" in done.stderr, "into soil: it is named")
+
+
 def refused():
     event = lambda lines: tray(more="[[event]]\n" + lines)  # noqa: E731
     span = "from = 0.1\nto = 0.2\n"
@@ -259,7 +271,7 @@ def refused():
 
 def main():
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    parts = (bits, train, work, tilt, earth_pressure, gate, refused)
+    parts = (bits, train, work, tilt, earth_pressure, gate, added, refused)
     for part in [p for p in parts if not sys.argv[2:] or p.__name__ in sys.argv[2:]]:
         print(f"# {part.__name__}", flush=True)
         part()
