@@ -1,6 +1,7 @@
 #pragma once
 // The staggered scheme by the book: what its two stages make of one particle, over all pairs, in plain loops and doubles. Terms of a pair
 // are those of by_the_book.hpp; what is its own are the moments at which they are taken, and walls as one surface.
+// Beyond 400 lines: all equations of a step on one page, to be read and compared as a whole.
 //
 //     strain   x, v, rho, sigma after the move; all distances half a step back, r_ij = x_ij - dt/2 v_ij:
 //              L_i = sum_j V_j (v_j - v_i) (x) grad W - sum_w V_w 2 P_w v_i (x) grad W,  w points of walls,
