@@ -2,9 +2,23 @@
 import csv
 import json
 import os
+import random
+import shutil
+import signal
 import subprocess
+import sys
+import time
 
-from harness import check, program
+from harness import check, finish, program
+
+
+def run_parts(*parts):
+    """The main() of a test of several parts: those that the command line names, or all."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    for part in [p for p in parts if not sys.argv[2:] or p.__name__ in sys.argv[2:]]:
+        print(f"# {part.__name__}", flush=True)
+        part()
+    finish()
 
 
 def value(x):
@@ -12,6 +26,15 @@ def value(x):
         return float(x)
     except ValueError:
         return x
+
+
+def check_shell(script, what):
+    """The script is sound shell."""
+    done = subprocess.run(["bash", "-n", script], capture_output=True, text=True)
+    check(done.returncode == 0, f"{what}: bash -n {done.stderr}")
+    if shutil.which("shellcheck"):
+        done = subprocess.run(["shellcheck", "-S", "warning", script], capture_output=True, text=True)
+        check(done.returncode == 0, f"{what}: shellcheck {done.stdout}")
 
 
 class Runs:
@@ -23,10 +46,42 @@ class Runs:
     def path(self, *parts):
         return os.path.join(self.work, *parts)
 
-    def scene(self, name, text):
-        with open(self.path(name + ".toml"), "w") as f:
+    def write(self, name, text, executable=False):
+        os.makedirs(os.path.dirname(self.path(name)), exist_ok=True)
+        with open(self.path(name), "w") as f:
             f.write(text)
-        return self.path(name + ".toml")
+        if executable:
+            os.chmod(self.path(name), 0o755)
+        return self.path(name)
+
+    def read(self, *name):
+        """The text of a file; none where there is no such file."""
+        try:
+            with open(self.path(*name)) as f:
+                return f.read()
+        except FileNotFoundError:
+            return ""
+
+    def scene(self, name, text):
+        return self.write(name + ".toml", text)
+
+    def call(self, *args, expect=0, says=()):
+        """The program in this directory."""
+        done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=self.work)
+        good = done.returncode == expect and all(word in done.stderr for word in says)
+        check(good, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {'' if good else done.stderr.strip()[-400:]}")
+        return done
+
+    def kill(self, args, times, least, most, seed, signals=(signal.SIGKILL,)):
+        """Starts the program so often, and sends it these signals in turn after a random time from `least` to `most` seconds; gives the
+        exit codes."""
+        moments, codes = random.Random(seed), []
+        for k in range(times):
+            half = subprocess.Popen([program, *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.work)
+            time.sleep(moments.uniform(least, most))
+            half.send_signal(signals[k % len(signals)])
+            codes.append(half.wait())
+        return codes
 
     def run(self, path, out, ranks=1, threads=1, extra=(), expect=0):
         command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
@@ -36,9 +91,12 @@ class Runs:
             check(done.returncode == expect, f"{out}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-400:]}")
         return done
 
-    def summary(self, out):
-        with open(self.path(out, "summary.json")) as f:
+    def json(self, *name):
+        with open(self.path(*name)) as f:
             return json.load(f)
+
+    def summary(self, out):
+        return self.json(out, "summary.json")
 
     def raw(self, out, name):
         with open(self.path(out, name), "rb") as f:

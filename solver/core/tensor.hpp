@@ -28,6 +28,10 @@ template <class V> KUZURE_INLINE Vec3<V> operator*(V s, Vec3<V> a) { return {s *
 template <class V> KUZURE_INLINE V dot(Vec3<V> a, Vec3<V> b) { return fma(a.z, b.z, fma(a.y, b.y, a.x * b.x)); }
 /// a + s b
 template <class V> KUZURE_INLINE Vec3<V> fma(V s, Vec3<V> b, Vec3<V> a) { return {fma(s, b.x, a.x), fma(s, b.y, a.y), fma(s, b.z, a.z)}; }
+template <class V> KUZURE_INLINE Vec3<V> cross(Vec3<V> a, Vec3<V> b)
+{
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 inline double length(Vector a) { return sqrt(dot(a, a)); }
 
 template <class V> KUZURE_INLINE Sym3<V> operator+(Sym3<V> a, Sym3<V> b)

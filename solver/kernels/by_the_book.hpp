@@ -152,7 +152,7 @@ struct Setting {
     std::span<const scene::Wall> walls;
     double damping = 0;
     WallLaw law = mirrored;
-    std::vector<scene::RigidMotion> motion = {}, next_motion = {}; // of each wall, in this step and the next; none: they stand still
+    std::vector<Vector> motion = {}, next_motion = {}; // m/s of each wall, in this step and the next; none: they stand still
     Kernel kernel() const { return {how.kernel, how.dimensions, how.h}; }
     double volume() const { return std::pow(how.spacing, how.dimensions); } // of a particle at reference density
 };
@@ -215,7 +215,6 @@ inline double elastic_power(const Material& soil, const Stress& sigma, const Str
 inline Matrix corrected(const Matrix& L, Matrix M, int dimensions)
 {
     if (dimensions == 2) M.y.y = (M.x.x + M.z.z) / 2;
-    const auto cross = [](Vector a, Vector b) { return Vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
     const Vector c0 = cross(M.y, M.z), c1 = cross(M.z, M.x), c2 = cross(M.x, M.y); // columns of det M times M^-1
     const double det = dot(M.x, c0), mean = trace(M) / 3;
     if (det <= 0.5 * mean * mean * mean || mean <= 0.4) return L;

@@ -129,7 +129,6 @@ inline double grip(const scene::Wall& w)
 /// which most pieces end, and around.
 inline bool folds(const Ground& ground, Vector edge, Vector way)
 {
-    const auto cross = [](Vector a, Vector b) { return Vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
     const Vector c = cross(way, std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0}), a = (1 / length(c)) * c, b = cross(way, a);
     std::vector<Vector> beside{{1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}};
     if (ground.dimensions == 3) {
@@ -191,13 +190,11 @@ inline Vector crossing(const scene::Wall& wall, const Face& face, Vector a)
 
 /// Velocity of the face at which a point mirrors, m/s: at an edge that one wall makes with that of the point, of the one along its own
 /// normal and of the other across it.
-inline Vector velocity_of(const GroundPoint& w, const Face& face, const std::vector<scene::RigidMotion>& motion)
+inline Vector velocity_of(const GroundPoint& w, const Face& face, const std::vector<Vector>& motion)
 {
     if (motion.empty()) return {};
-    const Vector foot = w.x + face.depth * face.normal, v = motion[std::size_t(face.wall)].at(foot);
-    if (w.wall == face.wall || dot(face.side, face.normal) > 1 - 1e-9) return v;
-    const Vector other = motion[std::size_t(w.wall)].at(foot);
-    return other + dot(v - other, face.side) * face.side;
+    const Vector v = motion[std::size_t(face.wall)], other = motion[std::size_t(w.wall)];
+    return dot(face.side, face.normal) > 1 - 1e-9 ? v : other + dot(v - other, face.side) * face.side;
 }
 
 // ---- the state -----------------------------------------------------------------------------------------------------

@@ -130,6 +130,8 @@ private:
     StateEnergy state(const Scene&, double dt) const;
     void take(double joules);
     PassResult run_stages(const StepInput&);
+    /// Where a wall stands at a time, s.
+    scene::Pose pose(int wall, double time) const;
     /// Walls that move stand where they do at a time, s: for all but the model.
     void move_walls(double time);
     /// For the model too, half-way through the step under way or at its end.

@@ -122,9 +122,11 @@ std::optional<Scene> Simulation::follow_courses(double dt)
 /// minus that and by -(g1 - g0) (D0 + D1)/2, which the event gives.
 void Simulation::end_course(const Scene& before) { take(0.5 * (state(before, clock_.dt).potential - state(scene_, clock_.dt).potential)); }
 
+scene::Pose Simulation::pose(int wall, double time) const { return scene::pose_at(start_scene_, wall, clock_.events, time); }
+
 void Simulation::move_walls(double time)
 {
-    for (const int w : moving_) scene_.walls[std::size_t(w)].pose = scene::pose_at(start_scene_, w, clock_.events, time);
+    for (const int w : moving_) scene_.walls[std::size_t(w)].pose = pose(w, time);
 }
 
 void Simulation::place_walls(const StepInput& in, bool midway)
@@ -132,9 +134,8 @@ void Simulation::place_walls(const StepInput& in, bool midway)
     const double begin = clock_.time, end = begin + in.dt;
     std::vector<WallPlace> places(scene_.walls.size());
     for (const int w : moving_) {
-        const auto pose = [&](double time) { return scene::pose_at(start_scene_, w, clock_.events, time); };
-        const scene::Pose back = scene::inverse(pose(clock_.sorted_time));
-        places[std::size_t(w)] = {scene::then(back, pose(begin)), scene::then(back, pose(end)), scene::then(back, pose(end + in.next))};
+        const auto since = [&](double time) { return scene::then(scene::inverse(pose(w, clock_.sorted_time)), pose(w, time)); };
+        places[std::size_t(w)] = {since(begin), since(end), since(end + in.next)};
     }
     model_->place_walls({places, in.dt, in.next, midway});
     if (!midway) move_walls(end);
@@ -142,14 +143,13 @@ void Simulation::place_walls(const StepInput& in, bool midway)
 
 void Simulation::meet_walls()
 {
+    if (!(clock_.next > 0)) return;
+    const double end = clock_.time + clock_.next;
     for (const int w : moving_) {
         const scene::Wall& wall = scene_.walls[std::size_t(w)];
         if (!wall.present) continue;
-        const auto pose = [&](double time) { return scene::pose_at(start_scene_, w, clock_.events, time); };
-        const double end = clock_.time + clock_.next;
-        const double way = scene::farthest_way(wall.shape, pose(clock_.sorted_time), pose(end));
-        const auto motion = scene::motion_between(start_scene_, w, clock_.events, clock_.time, end);
-        const double speed = scene::largest_speed(wall.shape, pose(clock_.time), motion);
+        const double way = scene::farthest_way(wall.shape, pose(w, clock_.sorted_time), pose(w, end));
+        const double speed = scene::farthest_way(wall.shape, pose(w, clock_.time), pose(w, end)) / clock_.next;
         clock_.extremes.displacement2 = std::max(clock_.extremes.displacement2, way * way);
         clock_.extremes.half_step_speed2 = std::max(clock_.extremes.half_step_speed2, speed * speed);
     }

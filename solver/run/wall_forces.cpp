@@ -9,9 +9,8 @@ namespace {
 /// x of A x = b.
 Vector solved(const Stress& A, Vector b)
 {
-    const Vector u = scene::cross({A.xy, A.yy, A.yz}, {A.xz, A.yz, A.zz}), v = scene::cross({A.xz, A.yz, A.zz}, {A.xx, A.xy, A.xz}),
-                 w = scene::cross({A.xx, A.xy, A.xz}, {A.xy, A.yy, A.yz});
-    return (1 / (A.xx * u.x + A.xy * u.y + A.xz * u.z)) * Vector{dot(u, b), dot(v, b), dot(w, b)};
+    const Vector x{A.xx, A.xy, A.xz}, y{A.xy, A.yy, A.yz}, z{A.xz, A.yz, A.zz}, u = cross(y, z), v = cross(z, x), w = cross(x, y);
+    return (1 / dot(x, u)) * Vector{dot(u, b), dot(v, b), dot(w, b)};
 }
 } // namespace
 
@@ -194,7 +193,8 @@ std::vector<WallLoad> WallForces::loads(const Team& team, const Particles& p, co
         for (Index c = 0; c < layout_.lists().size(); ++c)
             for_each_force(p, c, [&](std::size_t k, Vector x, Vector f) {
                 add(6 * k, f.x), add(6 * k + 1, f.y), add(6 * k + 2, f.z);
-                add(6 * k + 3, x.y * f.z - x.z * f.y), add(6 * k + 4, x.z * f.x - x.x * f.z), add(6 * k + 5, x.x * f.y - x.y * f.x);
+                const Vector moment = cross(x, f);
+                add(6 * k + 3, moment.x), add(6 * k + 4, moment.y), add(6 * k + 5, moment.z);
             });
     });
     const double unit = impulse_unit(clock);

@@ -81,34 +81,10 @@ Pose pose_at(const Scene& s, int wall, int begun, double time)
     return p;
 }
 
-RigidMotion motion_between(const Scene& s, int wall, int begun, double from, double to)
-{
-    RigidMotion all;
-    if (!(to > from)) return all;
-    for_each_move(s, wall, begun, [&](const Event& e, const WallMove& m) {
-        const double a = gone(e, from), b = gone(e, to), share = (b - a) / (to - from);
-        if (share == 0) return;
-        RigidMotion motion{share * m.velocity, {}};
-        if (m.turn) {
-            const Vector center = m.turn->center + (0.5 * (a + b)) * m.velocity;
-            motion.spin = (share * m.turn->rate / length(m.turn->axis)) * m.turn->axis;
-            motion.velocity = motion.velocity - cross(motion.spin, center);
-        }
-        all = all + motion;
-    });
-    return all;
-}
-
 double farthest_way(const Shape& shape, const Pose& a, const Pose& b)
 {
     double most = 0;
     for_each_corner(shape, [&](Vector x) { most = std::max(most, length(placed(b, x) - placed(a, x))); });
-    return most;
-}
-double largest_speed(const Shape& shape, const Pose& pose, const RigidMotion& motion)
-{
-    double most = 0;
-    for_each_corner(shape, [&](Vector x) { most = std::max(most, length(motion.at(placed(pose, x)))); });
     return most;
 }
 
@@ -120,8 +96,8 @@ double fastest_wall(const Scene& s)
         for (const Event& e : s.events)
             if (e.move && e.move->wall == s.walls[std::size_t(w)].name) {
                 const double begin = begin_of(e), soon = begin + 1e-3 * (end_of(e) - begin);
-                const auto motion = motion_between(s, w, all, begin, soon);
-                most = std::max(most, largest_speed(s.walls[std::size_t(w)].shape, pose_at(s, w, all, begin), motion));
+                const double way = farthest_way(s.walls[std::size_t(w)].shape, pose_at(s, w, all, begin), pose_at(s, w, all, soon));
+                most = std::max(most, way / (soon - begin));
             }
     return most;
 }

@@ -17,11 +17,8 @@ std::vector<int> moving_walls(const Scene&);
 
 /// Where a wall stands at `time` (s) once the first `begun` events of their order have begun.
 Pose pose_at(const Scene&, int wall, int begun, double time);
-/// Its mean motion from one time to a later one (s), as it stands half-way.
-RigidMotion motion_between(const Scene&, int wall, int begun, double from, double to);
-/// The farthest way (m) of any point of a shape from one pose to another, and the largest speed (m/s) of any in a pose.
+/// The farthest way (m) of any point of a shape from one pose to another.
 double farthest_way(const Shape&, const Pose&, const Pose&);
-double largest_speed(const Shape&, const Pose&, const RigidMotion&);
 /// The largest speed of any wall as an event that moves it begins, m/s; 0 where none does.
 double fastest_wall(const Scene&);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Where a wall that moves stands, and how it goes on: rigid motions.
+// Where a wall that moves stands.
 #include "solver/core/tensor.hpp"
 
 namespace kuzure::scene {
@@ -28,13 +28,5 @@ inline Pose inverse(const Pose& p)
     const Mat3<double>& r = p.turn;
     return {{{r.x.x, r.y.x, r.z.x}, {r.x.y, r.y.y, r.z.y}, {r.x.z, r.y.z, r.z.z}}, -1.0 * turned_back(p, p.shift)};
 }
-
-inline Vector cross(Vector a, Vector b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-/// How a rigid body moves: velocity (m/s) of its point at the origin, and angular velocity (1/s).
-struct RigidMotion {
-    Vector velocity{}, spin{};
-    Vector at(Vector x) const { return velocity + cross(spin, x); }
-};
-inline RigidMotion operator+(const RigidMotion& a, const RigidMotion& b) { return {a.velocity + b.velocity, a.spin + b.spin}; }
 
 } // namespace kuzure::scene

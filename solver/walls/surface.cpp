@@ -122,8 +122,7 @@ bool WallSurface::continued(Vector edge, Vector way) const
         if (air({side, 0, 0}) || air({0, 0, side}) || (dimensions_ == 3 && air({0, side, 0}))) return true;
     if (dimensions_ == 2) return false;
     const Vector any = std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0};
-    const Vector c{way.y * any.z - way.z * any.y, way.z * any.x - way.x * any.z, way.x * any.y - way.y * any.x}, a = (1 / length(c)) * c;
-    const Vector b{way.y * a.z - way.z * a.y, way.z * a.x - way.x * a.z, way.x * a.y - way.y * a.x};
+    const Vector c = cross(way, any), a = (1 / length(c)) * c, b = cross(way, a);
     for (int k = 0; k < 16; ++k) {
         const double turn = k * std::numbers::pi / 8;
         if (air(std::cos(turn) * a + std::sin(turn) * b)) return true;

@@ -4,14 +4,12 @@ the range, and refuses what it cannot use without writing anything."""
 import csv
 import json
 import os
-import random
 import shutil
-import subprocess
 import sys
-import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, program, scratch
+from harness import check, finish, scratch
+from runs import Runs
 
 work = scratch("fit")
 TRUE = 17.3  # deg, of the event; no value of the even scan
@@ -44,29 +42,25 @@ limits = [0.1]
 """
 
 
+runs = Runs(work)
+call = runs.call
+
+
 def scene(name, friction=25.0, end=1.0, more="", surface=None):
-    with open(os.path.join(work, name + ".toml"), "w") as f:
-        f.write(HEAP.format(end=end, more=more, surface=surface or f"{{ friction_angle = {friction} }}"))
+    runs.scene(name, HEAP.format(end=end, more=more, surface=surface or f"{{ friction_angle = {friction} }}"))
     return name + ".toml"
 
 
-def call(*args, expect=0):
-    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=work)
-    check(done.returncode == expect, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}")
-    return done
-
-
 def answer(directory):
-    with open(os.path.join(work, directory, "fit.json")) as f:
-        return json.load(f)
+    return runs.json(directory, "fit.json")
 
 
 def kept(directory):
     """What does not tell times."""
-    with open(os.path.join(work, directory, "curve.csv")) as f:
-        curve = f.read()
     j = answer(directory)
-    return curve, [j[k] for k in ("best", "interval", "misfit", "best_run", "alike", "particles_elsewhere", "at_end_of_range")]
+    return runs.read(directory, "curve.csv"), [
+        j[k] for k in ("best", "interval", "misfit", "best_run", "alike", "particles_elsewhere", "at_end_of_range")
+    ]
 
 
 # ---- an event of known friction, of which only the outline is given
@@ -100,12 +94,7 @@ call("report", os.path.join("found", "runs", "001"))
 
 # ---- kills and goings on
 command = ("fit", unknown, "--observed", outline, "--input", "bed_friction=8,32")
-random.seed(3)
-for kill in range(6):
-    half = subprocess.Popen([program, *command, "-o", "killed"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=work)
-    time.sleep(random.uniform(0.2, 1.5))
-    half.kill()
-    half.wait()
+runs.kill((*command, "-o", "killed"), 6, 0.2, 1.5, seed=3)
 call(*command, "-o", "killed", "--jobs", "1")
 check(kept("killed") == kept("found"), "killed at six moments, gone on with one run at a time: the same answer")
 again = call(*command, "-o", "found")

@@ -3,13 +3,13 @@
 order, with tasks that stop and tasks that never run: the maps are the bytes of kuzure hazard on one machine."""
 import os
 import re
-import shutil
 import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 import harness
 from harness import check, finish, program, root, scratch
+from runs import Runs, check_shell
 
 work = scratch("a hazard's jobs")  # with a blank and a quote: paths must be quoted
 SCENE = """title = "heap"
@@ -48,29 +48,12 @@ RUNS = ("--members", "4", "--layers", "2,4,6")
 COUNT = 4 + 3
 
 
-def write(name, text, executable=False):
-    path = os.path.join(work, name)
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    with open(path, "w") as f:
-        f.write(text)
-    if executable:
-        os.chmod(path, 0o755)
-    return path
+runs = Runs(work)
+write, read = runs.write, runs.read
 
 
-def read(name):
-    try:
-        with open(os.path.join(work, name)) as f:
-            return f.read()
-    except FileNotFoundError:
-        return ""
-
-
-def call(*args, expect=0, says=()):
-    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=work)
-    good = done.returncode == expect and all(word in done.stderr for word in says)
-    check(good, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {'' if good else done.stderr[-400:]}")
-    return done.stdout
+def call(*args, **how):
+    return runs.call(*args, **how).stdout
 
 
 env = dict(
@@ -136,12 +119,8 @@ def script_of(machine, out, ranks):
     text = call(
         "job", scene, "--machine", f"./{machine}.toml", "--nodes", "1", "--ranks-per-node", ranks, *RUNS, "-o", out, "--minutes", "6"
     )
-    write(f"{out}.sh", text)
-    done = subprocess.run(["bash", "-n", os.path.join(work, f"{out}.sh")], capture_output=True, text=True)
-    check(done.returncode == 0 and "{{" not in text, f"{machine}: sound shell {done.stderr}")
-    if shutil.which("shellcheck"):
-        done = subprocess.run(["shellcheck", "-S", "warning", os.path.join(work, f"{out}.sh")], capture_output=True, text=True)
-        check(done.returncode == 0, f"{machine}: shellcheck {done.stdout}")
+    check_shell(write(f"{out}.sh", text), machine)
+    check("{{" not in text, f"{machine}: nothing of the template is left")
     check("a task for each of 4 members" in text, f"{machine}: it says what it is for")
     return f"{out}.sh"
 

@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
@@ -13,6 +12,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 import harness
 from harness import check, finish, program, root, scratch
+from runs import Runs
 
 work = scratch("hazard")
 HEAP = """title = "heap"
@@ -50,16 +50,13 @@ with open(os.path.join(work, "houses.csv"), "w") as f:
     f.write("name,x,y\nunder the heap,0.3,0.3\nnear,0.7,0.3\nfar,2.9,1.9\n")
 
 
+runs = Runs(work)
+call = runs.call
+
+
 def scene(name, maps=MAPS, uncertain=UNCERTAIN, space=""):
-    with open(os.path.join(work, name + ".toml"), "w") as f:
-        f.write(HEAP.format(maps=maps, uncertain=uncertain, space=space))
+    runs.scene(name, HEAP.format(maps=maps, uncertain=uncertain, space=space))
     return name + ".toml"
-
-
-def call(*args, expect=0):
-    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=work)
-    check(done.returncode == expect, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}")
-    return done
 
 
 def digest(directory):
@@ -68,8 +65,7 @@ def digest(directory):
 
 
 def answer(directory):
-    with open(os.path.join(work, directory, "hazard.json")) as f:
-        return json.load(f)
+    return runs.json(directory, "hazard.json")
 
 
 def same(directory, what, want):
@@ -142,14 +138,7 @@ def main():
     call("hazard", heap, "-o", "listed-2", "--members-from", os.path.join("two", "shuffled.json"))
     same("listed-2", "members listed in another order", want)
 
-    random.seed(11)
-    for kill in range(12):
-        half = subprocess.Popen(
-            [program, "hazard", heap, "-o", "killed", "--jobs", "2", *SIX], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=work
-        )
-        time.sleep(random.uniform(0.05, 0.7))
-        half.kill()
-        half.wait()
+    runs.kill(("hazard", heap, "-o", "killed", "--jobs", "2", *SIX), 12, 0.05, 0.7, seed=11)
     call("hazard", heap, "-o", "killed", "--jobs", "2", *SIX)
     same("killed", "killed at 12 moments and gone on", want)
     check(not [n for n in os.listdir(os.path.join(work, "killed", "members")) if "old" in n], "and nothing is left of what was begun")

@@ -11,6 +11,7 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, check, finish, program, root, scratch
+from runs import Runs, check_shell
 
 work = scratch("a job")  # with a blank: paths must be quoted
 
@@ -22,24 +23,8 @@ def job(*args, expect=0, says=()):
     return done.stdout
 
 
-def write(name, text, executable=False):
-    path = os.path.join(work, name)
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    with open(path, "w") as f:
-        f.write(text)
-    if executable:
-        os.chmod(path, 0o755)
-    return path
-
-
-def read(name):
-    try:
-        with open(os.path.join(work, name)) as f:
-            return f.read()
-    except FileNotFoundError:
-        return ""
-
-
+runs = Runs(work)
+write, read = runs.write, runs.read
 SCENE = block(
     floor=((-0.4, -0.4, -0.16), (1.2, 0.8, 0)),
     title="a block thrown across the floor",
@@ -204,11 +189,7 @@ def every_profile():
         missing = [line for line in wanted if line not in text]
         check(not missing, f"{name} {mode}: the script asks for what was wanted {missing}")
         script = write(f"{name}{mode}.sh", text)
-        done = subprocess.run(["bash", "-n", script], capture_output=True, text=True)
-        check(done.returncode == 0, f"{name} {mode}: bash -n {done.stderr}")
-        if shutil.which("shellcheck"):
-            done = subprocess.run(["shellcheck", "-S", "warning", script], capture_output=True, text=True)
-            check(done.returncode == 0, f"{name} {mode}: shellcheck {done.stdout}")
+        check_shell(script, f"{name} {mode}")
         options = re.search(r"\n(?!#)", text)  # batch systems read options up to the first command
         check(not re.search(r"^#(PJM|SBATCH|PBS)", text[options.start() :], re.M), f"{name} {mode}: options come before commands")
         if name != "here":

@@ -7,8 +7,8 @@ import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, scratch
-from runs import Runs
+from harness import check, scratch
+from runs import Runs, run_parts
 
 runs = Runs(scratch("moving"))
 scene, run, summary, raw, table, unaccounted = runs.scene, runs.run, runs.summary, runs.raw, runs.table, runs.unaccounted
@@ -69,6 +69,14 @@ move = {{ wall = "{wall}", velocity = [{', '.join(map(str, velocity))}]{rotation
 """
 
 
+def without(text, wall):
+    """The scene less the wall of this name."""
+    head, *walls = text.split("[[wall]]")
+    walls[-1], rest = walls[-1].split("[effects]")
+    left = [w for w in walls if f'name = "{wall}"' not in w]
+    return "[[wall]]".join([head, *left]) + "[effects]" + rest
+
+
 COULOMB = "surface = { friction_angle = 20.0 }"
 
 
@@ -124,18 +132,52 @@ def train():
             )
 
 
+def drawn_otherwise():
+    """The same in the mirror, and with the plate cut in two that move alike: what the soil does is the same."""
+    kind = {"end": 0.1, "cohesion": 3e4, "floor": 'surface = "rough"', "time": "step = 0.0008", "history": 0.02}
+    turn = ", rotation = {{ center = [{}, 0.0, 0.0], rate = {} }}"
+    run(scene("drawn", tray(more=move("plate", (0.2, 0.0, 0.0), 0.01, 10, turn.format(0.0, 5.0)), **kind)), "drawn")
+    mirrored = tray(more=move("back", (-0.2, 0.0, 0.0), 0.01, 10, turn.format(2.0, -5.0)), **kind)
+    mirrored = mirrored.replace('1.6] }\nsurface = "smooth"', '1.6] }\nsurface = "rough"').replace(
+        'name = "plate"\nbox = { low = [-0.4, 0.0, 0.0], high = [0.0, 0.0, 1.6] }\nsurface = "rough"',
+        'name = "plate"\nbox = { low = [-0.4, 0.0, 0.0], high = [0.0, 0.0, 1.6] }\nsurface = "smooth"',
+    )
+    # the floor reaches as far on either side
+    run(
+        scene(
+            "mirrored", mirrored.replace("low = [-1.0, 0.0, -0.4]", "low = [-0.4, 0.0, -0.4]").replace("[2.4, 0.0, 0.0]", "[3.0, 0.0, 0.0]")
+        ),
+        "mirrored",
+    )
+    halves = tray(
+        more=move("plate", (0.2, 0.0, 0.0), 0.01, 10, turn.format(0.0, 5.0))
+        + move("above", (0.2, 0.0, 0.0), 0.01, 10, turn.format(0.0, 5.0)),
+        **kind,
+    ).replace("high = [0.0, 0.0, 1.6]", "high = [0.0, 0.0, 0.7]")
+    above = '[[wall]]\nname = "above"\nbox = { low = [-0.4, 0.0, 0.7], high = [0.0, 0.0, 1.6] }\n'
+    run(scene("cut", halves + above), "cut")
+
+    def pushed(out, *walls):
+        rows = [r for r in table(out, "forces.csv") if r["wall"] in walls]
+        last = [r for r in rows if r["time"] == rows[-1]["time"]]
+        return [sum(r[k] for r in last) for k in ("impulse_x", "impulse_z")], table(out, "history.csv")[-1]["moved_wall"]
+
+    (x, z), work_done = pushed("drawn", "plate")
+    check(work_done < -1, f"the plate gives {-work_done:.1f} J")
+    for name, walls, turned in (("mirrored", ("back",), -1), ("cut", ("plate", "above"), 1)):
+        (a, b), w = pushed(name, *walls)
+        worst = max(abs(turned * a - x), abs(b - z)) / abs(x)
+        check(worst < 1e-9 and abs(w / work_done - 1) < 1e-9, f"{name}: impulses {worst:.1e} apart, work {w / work_done - 1:.1e}")
+
+
 def work():
     """A plate hits a block that floats: the work is force times velocity to the last digits, half the momentum's."""
     v = 0.5
     plate = tray(
         time="step = 0.0002", end=0.05, cohesion=1e6, length=1.0, g=0.0, history=0.001, more=move("plate", (v, 0, 0), 0.0), effects=""
     ).replace('stress = "at rest"', "")
-    a, b = plate.index('[[wall]]\nname = "floor"'), plate.index('[[wall]]\nname = "plate"')
-    plate = plate[:a] + plate[b:]
-    a, b = plate.index('[[wall]]\nname = "back"'), plate.index("[effects]")
-    plate = (
-        (plate[:a] + plate[b:]).replace("high = [0.0, 0.0, 1.6]", "high = [0.0, 0.0, 2.0]").replace("[-0.4, 0.0, 0.0]", "[-0.4, 0.0, -1.0]")
-    )
+    plate = without(without(plate, "floor"), "back")
+    plate = plate.replace("high = [0.0, 0.0, 1.6]", "high = [0.0, 0.0, 2.0]").replace("[-0.4, 0.0, 0.0]", "[-0.4, 0.0, -1.0]")
     run(scene("hit", plate), "hit")
     rows, forces = table("hit", "history.csv"), table("hit", "forces.csv")
     worst = 0
@@ -208,8 +250,7 @@ box = { low = [1.0, 0.0, 0.0], high = [1.4, 0.0, 1.6] }
 surface = "smooth"
 """
     text = tray(length=1.0, end=1.6, floor='surface = "rough"', plate='surface = "smooth"')
-    a, b = text.index('[[wall]]\nname = "back"'), text.index("[effects]")
-    text = (text[:a] + text[b:]).replace("high = [1.4, 0.0, 0.0]", "high = [5.0, 0.0, 0.0]")
+    text = without(text, "back").replace("high = [1.4, 0.0, 0.0]", "high = [5.0, 0.0, 0.0]")
     run(scene("lifted", text + gate + move("gate", (0.0, 0.0, 1.5), 0.1, 1.6)), "lifted")
     run(scene("never", text), "never")
     front = lambda out, t: min(table(out, "history.csv"), key=lambda r: abs(r["time"] - t))["front_max_x"]  # noqa: E731
@@ -269,14 +310,5 @@ def refused():
     )
 
 
-def main():
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    parts = (bits, train, work, tilt, earth_pressure, gate, added, refused)
-    for part in [p for p in parts if not sys.argv[2:] or p.__name__ in sys.argv[2:]]:
-        print(f"# {part.__name__}", flush=True)
-        part()
-    finish()
-
-
 if __name__ == "__main__":
-    main()
+    run_parts(bits, train, drawn_otherwise, work, tilt, earth_pressure, gate, added, refused)

@@ -2,10 +2,8 @@
 """kuzure safety: a small slope's factor of safety is bracketed, scales with its strength, is the mirrored slope's, of any --jobs and after
 any kill; a stage of a scene with events; what lies outside the range; what is refused. Run as safety_test.py PROGRAM."""
 import csv
-import json
 import math
 import os
-import random
 import shutil
 import signal
 import subprocess
@@ -14,8 +12,10 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, finish, program, scratch
+from runs import Runs
 
 work = scratch("safety")
+runs = Runs(work)
 # Griffiths & Lane (1999), example 1, ten spacings high: factor of safety 1.38.
 H, DX = 10.0, 1.0
 
@@ -70,20 +70,16 @@ artificial_stress = "auto"
     return name + ".toml"
 
 
-def call(*args, expect=0):
-    done = subprocess.run([program, "safety", *args], capture_output=True, text=True, timeout=300, cwd=work)
-    check(done.returncode == expect, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {done.stderr.strip()[-300:]}")
-    return done
+def call(*args, **how):
+    return runs.call("safety", *args, **how)
 
 
 def answer(directory):
-    with open(os.path.join(work, directory, "safety.json")) as f:
-        return json.load(f)
+    return runs.json(directory, "safety.json")
 
 
 def table(directory):
-    with open(os.path.join(work, directory, "safety.csv")) as f:
-        return f.read()
+    return runs.read(directory, "safety.csv")
 
 
 def rows(directory):
@@ -143,14 +139,8 @@ call(strong, "-o", "strong", *WIDE[:2], "--to", "4", *WIDE[4:])
 twice = answer("strong")
 check(abs(twice["factor"] - 2 * one["factor"]) <= 0.02 + 2 * 0.02 + 1e-9, f"twice the strength: {twice['factor']} of {one['factor']}")
 
-random.seed(7)
-command = [program, "safety", slope, "-o", "killed", "--jobs", "1", *WIDE]
-for kill in range(8):
-    half = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=work)
-    time.sleep(random.uniform(0.05, 0.6))
-    half.send_signal(signal.SIGKILL if kill % 2 else signal.SIGTERM)
-    half.wait()
-    check(half.returncode in (0, 5, -signal.SIGKILL, -signal.SIGTERM), f"kill {kill}: {half.returncode}")
+codes = runs.kill(("safety", slope, "-o", "killed", "--jobs", "1", *WIDE), 8, 0.05, 0.6, seed=7, signals=(signal.SIGTERM, signal.SIGKILL))
+check(all(c in (0, 5, -signal.SIGKILL, -signal.SIGTERM) for c in codes), f"killed: {codes}")
 call(slope, "-o", "killed", "--jobs", "1", *WIDE)
 check(table("killed") == before, "after eight kills: the same bytes of safety.csv")
 stopped = subprocess.Popen([program, "safety", slope, "-o", "stopped", *WIDE], stdout=subprocess.PIPE, text=True, cwd=work)

@@ -8,8 +8,8 @@ import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import check, finish, program, scratch
-from runs import Runs
+from harness import check, program, scratch
+from runs import Runs, run_parts
 
 work = scratch("stages")
 
@@ -342,14 +342,5 @@ def refused():
     runs.refused(wrong)
 
 
-def main():
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    parts = (excavation, momentum, gate, shaking, slope, refused)
-    for part in [p for p in parts if not sys.argv[2:] or p.__name__ in sys.argv[2:]]:
-        print(f"# {part.__name__}", flush=True)
-        part()
-    finish()
-
-
 if __name__ == "__main__":
-    main()
+    run_parts(excavation, momentum, gate, shaking, slope, refused)

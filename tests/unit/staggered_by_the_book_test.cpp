@@ -154,8 +154,8 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         }
     book::Setting setting{s.interactions(), c.soils, s.walls, damping};
     for (const auto& p : places) {
-        setting.motion.push_back({(1 / wall_dt) * (p.after.shift - p.before.shift), {}});
-        setting.next_motion.push_back({(1 / wall_next) * (p.later.shift - p.after.shift), {}});
+        setting.motion.push_back((1 / wall_dt) * (p.after.shift - p.before.shift));
+        setting.next_motion.push_back((1 / wall_next) * (p.later.shift - p.after.shift));
     }
     const book::Soil ground_soil{x, v, density, stress, soil};
     const auto [dt, next] = steps(c);

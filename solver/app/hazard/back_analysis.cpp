@@ -3,7 +3,6 @@
 #include "io/ground/raster.hpp"
 #include "io/map_picture.hpp"
 #include "io/owner.hpp"
-#include "solver/app/hazard/directory.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/study/runs.hpp"
 #include "solver/core/wall_clock.hpp"
@@ -50,7 +49,7 @@ public:
                                        a.scene.file));
         spacing_ = layers_.given ? possible_spacing(base_, base_.spacing_of(layers_.ensemble)) : own;
         observed_ = read_observed(a.observed, base_, checked.filling, base_.wet);
-        out_ = directory_for(a.output, base_.scene, a.scene.file, "fit");
+        out_ = study::directory_for(a.output, base_.scene, a.scene.file, "fit");
         cores_ = std::max(1, cores_here());
         jobs_ = std::min(a.jobs > 0 ? a.jobs : cores_, study::most_children);
     }
@@ -72,7 +71,7 @@ public:
             io::parse_scene(r.text, fmt::format("{} with the {} value of the range", args_.scene.file, high ? "high" : "low"), r.sets);
         }
         for (const auto& doubt : observed_.doubts) complain(doubt);
-        make_directories(out_, "runs");
+        study::make_directories(out_, {"scenes", "inputs", "logs", "runs"});
         owner_.emplace(io::hold(out_), complain);
         keep_plan();
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));
@@ -231,7 +230,7 @@ private:
                 todo.push_back(known->run);
             }
             if (!work(todo)) break;
-            publish(false);
+            publish(state(false));
         }
     }
     /// Whether all of them have ended.
@@ -335,9 +334,8 @@ private:
         return all;
     }
 
-    void publish(bool final)
+    void publish(const BackState& s)
     {
-        const BackState s = state(final);
         if (!s.verdict) return;
         draw(s);
         io::write_atomically(out_ / "curve.csv", curve_csv(s));
@@ -366,9 +364,9 @@ private:
     Exit end()
     {
         const bool stopped = stop_->came();
-        publish(true);
-        stop_.reset();
         const BackState s = state(true);
+        publish(s);
+        stop_.reset();
         if (!s.verdict) {
             for (const auto& line : s.not_done) say("  not done: " + line.en);
             if (stopped) {

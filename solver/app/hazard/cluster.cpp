@@ -1,7 +1,7 @@
 #include "solver/app/hazard/cluster.hpp"
-#include "solver/app/hazard/directory.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/hazard/run_scene.hpp"
+#include "solver/app/study/runs.hpp"
 #include <fmt/format.h>
 
 namespace kuzure::hazard {
@@ -26,7 +26,7 @@ ClusterRuns cluster_runs(const Comm& comm, const SceneArguments& scene, int memb
     const auto r = run_scene(base, spacing_of(std::max(l.ensemble, l.finer)), corner_member(base.uncertain, {}), "the finest run", {});
     const int asked = members > 0 ? members : base.uncertain.members > 0 ? base.uncertain.members : usual_members;
     return {io::parse_checked_scene(r.text, scene.file + " with the layers of its finest run", r.sets, scene.step_limit()), text, asked,
-            directory_for(output, base.scene, scene.file, "hazard")};
+            study::directory_for(output, base.scene, scene.file, "hazard")};
 }
 
 } // namespace kuzure::hazard

@@ -1,6 +1,5 @@
 #include "solver/app/hazard/runner.hpp"
 #include "io/owner.hpp"
-#include "solver/app/hazard/directory.hpp"
 #include "solver/app/hazard/page.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/hazard/queue.hpp"
@@ -50,7 +49,7 @@ public:
             throw BadInput(fmt::format("{}: --prepare: expected [uncertain] in the scene, found none: it would be one run, kuzure run",
                                        args_.scene.file));
         points_ = points_of_maps(comm, base_.scene, checked.filling, [&](const std::string& w) { complain(w); });
-        out_ = directory_for(a.output, base_.scene, a.scene.file, "hazard");
+        out_ = study::directory_for(a.output, base_.scene, a.scene.file, "hazard");
         cores_ = std::max(1, cores_here());
         jobs_ = std::min(a.jobs > 0 ? a.jobs : cores_, study::most_children);
     }
@@ -142,7 +141,7 @@ private:
 
     void open()
     {
-        make_directories(out_, "members");
+        study::make_directories(out_, {"scenes", "inputs", "logs", "members"});
         owner_.emplace(io::hold(out_), complain);
         keep_plan();
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));

@@ -32,7 +32,7 @@ io::WallPoints walls_of_now(const io::WallPoints& drawn, const scene::Filling& f
     for (std::size_t k = 0; k < drawn.size(); ++k) {
         const scene::Wall& wall = now.walls[std::size_t(f.wall_of(drawn.id[k]))];
         if (!wall.present) continue;
-        w.position.push_back(wall.pose == scene::Pose{} ? drawn.position[k] : scene::placed(wall.pose, drawn.position[k]));
+        w.position.push_back(scene::placed(wall.pose, drawn.position[k]));
         w.id.push_back(drawn.id[k]), w.density.push_back(drawn.density[k]);
     }
     return w;

@@ -42,10 +42,7 @@ public:
             throw BadInput(fmt::format("{}: start.from: {}: expected the result directory of a run, or a checkpoint; found nothing there. "
                                        "Remedy: run that scene first",
                                        a.scene.file, s.start.from));
-        out_ = std::filesystem::absolute(!a.output.empty() ? io::Path(a.output)
-                                         : !s.output.directory.empty()
-                                             ? io::Path(s.output.directory + "-safety")
-                                             : io::Path("results") / (io::Path(a.scene.file).stem().string() + "-safety"));
+        out_ = std::filesystem::absolute(study::directory_for(a.output, s, a.scene.file, "safety"));
         if (a.at) {
             state_ = s;
             state_->time.end = *a.at;
@@ -108,10 +105,8 @@ private:
 
     void open()
     {
-        std::error_code error;
-        std::filesystem::create_directories(out_, error);
+        study::make_directories(out_, {"scenes", "runs", "logs", "trials"});
         owner_.emplace(io::hold(out_), complain);
-        for (const char* name : {"scenes", "runs", "logs", "trials"}) std::filesystem::create_directories(out_ / name, error);
         io::write_atomically(out_ / "plan.json", Json{{"of", identity_}}.dump(1) + "\n");
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));
     }
@@ -212,10 +207,7 @@ private:
     }
     void keep(const Trial& t) const
     {
-        Json all = Json::array();
-        for (const auto& s : t.seen)
-            all.push_back({{"time", s.time}, {"displacement", s.displacement}, {"creep", s.creep}, {"unbalanced", s.unbalanced}});
-        io::write_atomically(record_of(t.name), Json{{"factor", t.factor}, {"legs", all}, {"seconds", t.seconds}}.dump(1) + "\n");
+        io::write_atomically(record_of(t.name), Json{{"factor", t.factor}, {"legs", legs_of(t)}, {"seconds", t.seconds}}.dump(1) + "\n");
     }
 
     Running begin_leg(int step)

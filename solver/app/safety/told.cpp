@@ -37,6 +37,14 @@ std::vector<std::string> notes_of(const Scene& s)
     return notes;
 }
 
+Json legs_of(const Trial& t)
+{
+    Json legs = Json::array();
+    for (const auto& s : t.seen)
+        legs.push_back({{"time", s.time}, {"displacement", s.displacement}, {"creep", s.creep}, {"unbalanced", s.unbalanced}});
+    return legs;
+}
+
 Json to_json(const Told& t)
 {
     const auto number = [](const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); };
@@ -51,16 +59,13 @@ Json to_json(const Told& t)
     if (!t.picture.empty()) j["picture"] = t.picture;
     j["trials"] = Json::array();
     for (const auto& trial : t.trials) {
-        Json legs = Json::array();
-        for (const auto& s : trial.seen)
-            legs.push_back({{"time", s.time}, {"displacement", s.displacement}, {"creep", s.creep}, {"unbalanced", s.unbalanced}});
         j["trials"].push_back({{"factor", trial.factor},
                                {"outcome", word(trial.outcome)},
                                {"run", "runs/" + trial.name},
                                {"displacement", trial.seen.back().displacement},
                                {"unbalanced", trial.seen.back().unbalanced},
                                {"seconds", trial.seconds},
-                               {"legs", legs}});
+                               {"legs", legs_of(trial)}});
     }
     return j;
 }

@@ -28,6 +28,20 @@ std::string last_words(const io::Path& log)
     return text.starts_with("kuzure: ") ? text.substr(8) : text;
 }
 
+io::Path directory_for(const std::string& asked, const Scene& s, const std::string& scene_file, const std::string& what)
+{
+    if (!asked.empty()) return asked;
+    if (!s.output.directory.empty()) return s.output.directory + "-" + what;
+    return io::Path("results") / (io::Path(scene_file).stem().string() + "-" + what);
+}
+
+void make_directories(const io::Path& directory, std::initializer_list<const char*> folders)
+{
+    std::error_code error; // writing says why, where it fails
+    std::filesystem::create_directories(directory, error);
+    for (const char* name : folders) std::filesystem::create_directories(directory / name, error);
+}
+
 void require_own_directory(const io::Path& out, const char* mark, const char* what)
 {
     std::error_code error;

@@ -1,6 +1,8 @@
 #pragma once
 // What all commands share that start runs of their own in a directory of their own: words, whose directory it is, what was left there.
 #include "io/file.hpp"
+#include "solver/scene/scene.hpp"
+#include <initializer_list>
 #include <string>
 
 namespace kuzure::study {
@@ -12,6 +14,10 @@ std::string seconds_text(double seconds);
 /// The last line that a child said into its log, without the program's name.
 std::string last_words(const io::Path& log);
 
+/// What was asked for, or the scene's output directory and "-what", or results/FILE-what.
+io::Path directory_for(const std::string& asked, const Scene&, const std::string& scene_file, const std::string& what);
+/// The directory with these folders.
+void make_directories(const io::Path& directory, std::initializer_list<const char*> folders);
 /// Throws BadInput where `out` is a file, or a directory that holds other things than those of a `what` ("a hazard"), which has `mark` in
 /// it; nothing there, or an empty directory, is fine.
 void require_own_directory(const io::Path& out, const char* mark, const char* what);
