@@ -18,14 +18,14 @@ struct Head {
 Head head(const HistoryRow*, int dimensions)
 {
     return {"time,step,dt,kinetic,potential,elastic,plastic,viscous,wall,damping,residual,max_speed,height,"
-            "front_min_x,front_max_x,front_min_y,front_max_y,stabilising,moved_wall,events",
-            fmt::format("# s,1,s,{0},{0},{0},{0},{0},{0},{0},1,m/s,m,m,m,m,m,{0},{0},{0}", per_metre("J", dimensions))};
+            "front_min_x,front_max_x,front_min_y,front_max_y,stabilising,moved_wall,events,loads",
+            fmt::format("# s,1,s,{0},{0},{0},{0},{0},{0},{0},1,m/s,m,m,m,m,m,{0},{0},{0},{0}", per_metre("J", dimensions))};
 }
 std::string text(const HistoryRow& r)
 {
     std::string line = fmt::format("{},{}", cell(r.time), r.step);
     for (double x : {r.dt, r.kinetic, r.potential, r.elastic, r.plastic, r.viscous, r.wall, r.damping, r.residual, r.max_speed, r.height,
-                     r.front_min_x, r.front_max_x, r.front_min_y, r.front_max_y, r.stabilising, r.moved_wall, r.events})
+                     r.front_min_x, r.front_max_x, r.front_min_y, r.front_max_y, r.stabilising, r.moved_wall, r.events, r.loads})
         line += ',' + cell(x);
     return line;
 }

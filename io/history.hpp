@@ -17,7 +17,7 @@ struct HistoryRow {
     double max_speed;                                                    // m/s
     double height, front_min_x, front_max_x, front_min_y, front_max_y;   // m
     double stabilising, moved_wall; // J; work of artificial stress and stress diffusion, of walls that move
-    double events;                  // J, that events have taken
+    double events, loads;           // J, that events and loads have taken
 };
 
 /// events.csv: what happened, a row an event.

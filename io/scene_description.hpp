@@ -28,14 +28,17 @@ struct KeyInfo {
 // m; beyond it the number is not meant in metres
 constexpr Range coordinate = between(-1e9, 1e9), size = above_to(0, 1e9);
 
+template <class A> void describe_box(A& a, const std::string& p, scene::Box& box)
+{
+    a.vector(p + ".low", box.low, {.unit = "m", .range = coordinate, .example = "[0.0, 0.0, 0.0]", .doc = "lower corner"});
+    a.vector(p + ".high", box.high, {.unit = "m", .range = coordinate, .example = "[1.0, 1.0, 1.0]", .doc = "upper corner"});
+}
+
 template <class A> void describe_shape(A& a, const std::string& path, scene::Shape& shape)
 {
     a.template alternative<scene::Box>(
         path + ".box", shape, {.example = "{ low = [0.0, 0.0, 0.0], high = [1.0, 1.0, 1.0] }", .doc = "a box of whole spacings a side"},
-        [&](const std::string& p, auto& s) {
-            a.vector(p + ".low", s.low, {.unit = "m", .range = coordinate, .example = "[0.0, 0.0, 0.0]", .doc = "lower corner"});
-            a.vector(p + ".high", s.high, {.unit = "m", .range = coordinate, .example = "[1.0, 1.0, 1.0]", .doc = "upper corner"});
-        });
+        [&](const std::string& p, auto& s) { describe_box(a, p, s); });
     a.template alternative<scene::Cylinder>(
         path + ".cylinder", shape,
         {.example = "{ base = [0.0, 0.0, 0.0], radius = 0.1, height = 0.2 }", .doc = "an upright cylinder (3-D)"},
@@ -153,7 +156,7 @@ inline Words<scene::Cone> cone_words()
 /// Of a body or wall.
 inline KeyInfo name_info(const char* example)
 {
-    return {.optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall or body has it"};
+    return {.optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall, body or load has it"};
 }
 
 /// What changes a soil's strength as it yields.
@@ -409,6 +412,46 @@ template <class A> void describe_move(A& a, const std::string& p, scene::WallMov
                           .doc = "direction of the axis; a right-handed turn about it is positive"});
                 a.angle(q + ".rate", t.rate, {.unit = "deg/s", .range = between(-1e6, 1e6), .example = "2.0", .doc = "how fast it turns"});
             });
+    a.number(
+        p + ".ramp", m.ramp,
+        {.unit = "s",
+         .range = from(0),
+         .fallback = "0.0",
+         .example = "0.1",
+         .doc = "time in which the motion comes to that speed, and in which it comes to rest at its end; the way is that much shorter"});
+    a.text(p + ".path", m.path.file,
+           {.optional = true,
+            .example = "\"path.csv\"",
+            .doc = "instead, with at: a .csv with the columns time, x, y, z, seconds from at on and metres from where the wall stands then",
+            .role = Role::Bookkeeping}); // its content counts
+}
+
+template <class A> void describe_load(A& a, const std::string& path, scene::Load& l)
+{
+    a.text(path + ".name", l.name, {.optional = true, .example = "\"footing\"", .doc = "by which events and outputs know it"});
+    a.number(path + ".pressure", l.pressure,
+             {.unit = "Pa", .range = above(0), .example = "2.0e4", .doc = "on the free faces of the soil, into it"});
+    a.vector(path + ".traction", l.traction,
+             {.unit = "Pa",
+              .range = between(-1e12, 1e12),
+              .example = "[0.0, 0.0, -2.0e4]",
+              .doc = "instead of pressure: force for each area of the face that looks along normal"});
+    a.vector(path + ".normal", l.normal,
+             {.unit = "1",
+              .range = between(-1e6, 1e6),
+              .example = "[0.0, 0.0, 1.0]",
+              .doc = "which way the loaded face looks: area counts as it is seen along it; without it every free face"});
+    a.table(path + ".box", l.box,
+            {.example = "{ low = [0.0, 0.0, 0.8], high = [1.0, 1.0, 1.2] }",
+             .doc = "soil in it as the load begins is pushed: the face, and the two layers below it; without it all soil"},
+            [&](const std::string& p, scene::Box& box) { describe_box(a, p, box); });
+    a.text(path + ".body", l.body, {.optional = true, .example = "\"block\"", .doc = "only the soil of the body of this name"});
+    a.flag(path + ".follow", l.follow,
+           {.fallback = "false",
+            .example = "true",
+            .doc = "the pressure acts on the faces as they are at each time; without it each particle keeps the force of the start"});
+    a.number(path + ".factor", l.factor,
+             {.unit = "1", .range = from(0), .fallback = "1.0", .example = "0.0", .doc = "how much of it acts before an event changes it"});
 }
 
 template <class A> void describe_probe(A& a, const std::string& path, scene::Probe& p)
@@ -423,6 +466,9 @@ template <class A> void describe_probe(A& a, const std::string& path, scene::Pro
 
 template <class A> void describe_events(A& a, Scene& s)
 {
+    a.tables("load", s.loads,
+             {.optional = true, .example = "[[load]]", .doc = "a pressure or traction on free faces of soil (docs/stages.md)"},
+             [&](const std::string& path, scene::Load& l) { describe_load(a, path, l); });
     a.tables(
         "event", s.events, {.optional = true, .example = "[[event]]", .doc = "a change while the run goes on (docs/stages.md)"},
         [&](const std::string& path, scene::Event& e) {
@@ -432,11 +478,11 @@ template <class A> void describe_events(A& a, Scene& s)
                      {.unit = "s", .range = from(0), .example = "2.0", .doc = "instead of at: when a linear change begins"});
             a.number(path + ".to", e.to, {.unit = "s", .range = above(0), .example = "3.0", .doc = "when it is complete"});
             a.some_names(path + ".remove", e.remove,
-                         {.optional = true, .example = "\"gate\"", .doc = "names of walls and bodies that go, or one of them"});
+                         {.optional = true, .example = "\"gate\"", .doc = "names of walls, bodies and loads that go, or one of them"});
             a.some_names(path + ".add", e.add,
                          {.optional = true,
                           .example = "\"lift\"",
-                          .doc = "names of walls and bodies that come: they are not there before, the soil is as its body says"});
+                          .doc = "names of walls, bodies and loads that come: they are not there before, the soil is as its body says"});
             a.vector(path + ".gravity", e.gravity,
                      {.unit = "m/s^2", .range = between(-1e6, 1e6), .example = "[2.0, 0.0, -9.81]", .doc = "gravity from then on"});
             a.text(path + ".shaking", e.shaking.file,
@@ -460,6 +506,13 @@ template <class A> void describe_events(A& a, Scene& s)
             a.table(path + ".move", e.move,
                     {.example = "{ wall = \"gate\", velocity = [0.0, 0.0, 1.5] }", .doc = "a wall that moves, from from to to"},
                     [&](const std::string& p, scene::WallMove& m) { describe_move(a, p, m); });
+            a.table(path + ".load", e.load,
+                    {.example = "{ name = \"footing\", factor = 1.5 }", .doc = "how much of a load acts from then on"},
+                    [&](const std::string& p, scene::LoadChange& l) {
+                        a.text(p + ".name", l.name, {.example = "\"footing\"", .doc = "name of the load"});
+                        a.number(p + ".factor", l.factor,
+                                 {.unit = "1", .range = from(0), .example = "1.5", .doc = "of its pressure or traction"});
+                    });
             a.soil_changes(path + ".soil", e.soils, s.soils,
                            {.optional = true, .example = "[event.soil.sand]", .doc = "what a soil becomes; only what is written changes"},
                            [&](const std::string& p, scene::SoilChange& soil) { describe_soil_change(a, p, soil); });

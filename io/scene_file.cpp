@@ -1,8 +1,8 @@
 #include "io/scene_file.hpp"
 #include "io/document.hpp"
 #include "io/ground/ground.hpp"
-#include "io/ground_motion.hpp"
 #include "io/scene_description.hpp"
+#include "io/time_record.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/effects_list.hpp"
 #include <algorithm>
@@ -271,15 +271,18 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
         if (!path.empty()) path = std::filesystem::absolute(std::filesystem::path(name).parent_path() / path).lexically_normal().string();
     };
     absolute(scene.start.from);
-    for (std::size_t k = 0; k < scene.events.size(); ++k) {
-        auto& shaking = scene.events[k].shaking;
-        if (shaking.file.empty()) continue;
-        absolute(shaking.file);
+    const auto load_record = [&](scene::Record& record, const std::string& key, const RecordOf& what) {
+        if (record.file.empty()) return;
+        absolute(record.file);
         try {
-            shaking.rows = std::make_shared<const std::vector<std::array<double, 4>>>(read_ground_motion(shaking.file));
+            record.rows = std::make_shared<const std::vector<std::array<double, 4>>>(read_time_record(record.file, what));
         } catch (const BadInput& e) {
-            file.complain(fmt::format("event.{}.shaking", k), e.what());
+            file.complain(key, e.what());
         }
+    };
+    for (std::size_t k = 0; k < scene.events.size(); ++k) {
+        load_record(scene.events[k].shaking, fmt::format("event.{}.shaking", k), {"ground motion", "m/s^2"});
+        if (auto& move = scene.events[k].move) load_record(move->path, fmt::format("event.{}.move.path", k), {"a wall's way", "m"});
     }
     file.throw_if_any();
     if (scene.maps) absolute(scene.maps->points);

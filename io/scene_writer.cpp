@@ -255,13 +255,18 @@ void write_ground(const Scene& scene, std::string& out)
     }
 }
 
-/// What files of ground motion have given.
-void write_motions(const Scene& scene, std::string& out)
+/// What files of ground motion and of walls' ways have given.
+void write_records(const Scene& scene, std::string& out)
 {
-    for (std::size_t k = 0; k < scene.events.size(); ++k)
-        if (const auto& rows = scene.events[k].shaking.rows)
-            for (const auto& r : *rows)
-                out += fmt::format("event.{}.shaking = [{}, {}, {}, {}]\n", k, r[0], r[1] + 0.0, r[2] + 0.0, r[3] + 0.0);
+    const auto write = [&](std::size_t event, const char* key, const scene::Record& record) {
+        if (!record.rows) return;
+        for (const auto& r : *record.rows)
+            out += fmt::format("event.{}.{} = [{}, {}, {}, {}]\n", event, key, r[0], r[1] + 0.0, r[2] + 0.0, r[3] + 0.0);
+    };
+    for (std::size_t k = 0; k < scene.events.size(); ++k) {
+        write(k, "shaking", scene.events[k].shaking);
+        if (const auto& move = scene.events[k].move) write(k, "move.path", move->path);
+    }
 }
 
 std::string written(const Scene& scene, Purpose purpose)
@@ -271,7 +276,7 @@ std::string written(const Scene& scene, Purpose purpose)
     // The ground is said by [terrain].
     std::erase_if(copy.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
     describe(writer, copy);
-    if (purpose == Purpose::Hash) write_ground(scene, writer.out), write_motions(scene, writer.out);
+    if (purpose == Purpose::Hash) write_ground(scene, writer.out), write_records(scene, writer.out);
     return writer.out;
 }
 

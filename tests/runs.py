@@ -109,11 +109,11 @@ class Runs:
         return [{k: value(x) for k, x in r.items()} for r in rows]
 
     def unaccounted(self, out):
-        """Of each row of the history, the energy that came from nowhere since the start, J; and the largest energy of the run, that moving walls gave too."""
+        """Of each row of the history, the energy that came from nowhere since the start, J; and the largest energy of the run, what moving walls and loads gave too."""
         rows = self.table(out, "history.csv")
-        accounts = "kinetic potential elastic plastic viscous wall damping stabilising moved_wall events".split()
+        accounts = "kinetic potential elastic plastic viscous wall damping stabilising moved_wall events loads".split()
         sums = [sum(r[k] for k in accounts) for r in rows]
-        largest = max(max(r["kinetic"] + r["elastic"] + max(-r["potential"], 0), abs(r["moved_wall"])) for r in rows)
+        largest = max(max(r["kinetic"] + r["elastic"] + max(-r["potential"], 0), abs(r["moved_wall"]), abs(r["loads"])) for r in rows)
         return [s - sums[0] for s in sums], largest
 
     def refused(self, scenes):

@@ -53,6 +53,11 @@ inline constexpr struct WallFriction : Field<"wall_friction", "m/s^2", Shape::Sc
 // Only where forces on walls are told: acceleration by all walls together.
 inline constexpr struct WallForce : Field<"wall_force", "m/s^2", Shape::Vector> {
 } wall_force;
+// Only where the scene has loads: the number of the load that pushes the particle, from 1 (0: none), and its force with all of it.
+inline constexpr struct Load : Field<"load", "1", Shape::Scalar, std::int32_t> {
+} load;
+inline constexpr struct LoadPush : Field<"load_push", "N", Shape::Vector> {
+} load_push;
 // State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
 } half_velocity;
@@ -79,7 +84,7 @@ enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
 using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
                              field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction,
-                             field::WallForce, field::HalfVelocity, field::HalfDensity, field::HalfStress, field::SortedPosition,
-                             field::Origin, field::Id, field::Soil, field::Activity>;
+                             field::WallForce, field::Load, field::LoadPush, field::HalfVelocity, field::HalfDensity, field::HalfStress,
+                             field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -72,12 +72,41 @@ private:
         WallPower<Lane> power;
         const auto runs = in.lists->walls(cluster);
         const bool moving = !runs.empty() && Below::walls_move();
-        if (moving) power = {}, tally.pairs += sum_wall_forces<true>(in, i, runs, walls, &power);
-        else if (!runs.empty()) tally.pairs += sum_wall_forces<false>(in, i, runs, walls, nullptr);
+        if (moving) power = {}, tally.pairs += sum_wall_forces<true>(in, i, runs, stress_of(in, i), walls, &power);
+        else if (!runs.empty()) tally.pairs += sum_wall_forces<false>(in, i, runs, stress_of(in, i), walls, nullptr);
+        ForceWalls<Lane> loaded;
+        const bool pressed = !runs.empty() && any_pressure(in, i);
+        if (pressed) loaded = {}, sum_wall_forces<false>(in, i, runs, pressure_of(in, i), loaded, nullptr);
         Below::for_each_register(
             i, [&](const Lanes& lanes) __attribute__((always_inline)) {
-                update_force(in, sums, walls, !runs.empty(), moving ? &power : nullptr, lanes, awake, tally);
+                update_force(in, sums, walls, !runs.empty(), moving ? &power : nullptr, pressed ? &loaded : nullptr, lanes, awake, tally);
             });
+    }
+    KUZURE_INLINE static Sym3<V> stress_of(const StepInput& in, const Cluster<V>& i)
+    {
+        const auto s = std::as_const(*in.particles)[field::stress];
+        const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
+        return {narrow(0), narrow(1), narrow(2), narrow(3), narrow(4), narrow(5)};
+    }
+    static LoadNow load_on(const StepInput& in, Index i)
+    {
+        const std::int32_t number = std::as_const(*in.particles)[field::load][i];
+        return number > 0 ? in.loads[std::size_t(number) - 1] : LoadNow{};
+    }
+    /// True where a pressure that follows its face acts on one of the cluster's particles.
+    static bool any_pressure(const StepInput& in, const Cluster<V>& i)
+    {
+        bool any = false;
+        for (int k = 0; !in.loads.empty() && k < i.count; ++k) any = any || load_on(in, i.first + k).pressure != 0;
+        return any;
+    }
+    /// Those pressures as stresses, in tension.
+    static Sym3<V> pressure_of(const StepInput& in, const Cluster<V>& i)
+    {
+        T p[W];
+        for (int k = 0; k < W; ++k) p[k] = k < i.count ? T(load_on(in, i.first + k).pressure) : T(0);
+        const V all = load<V>(p), zero(T(0));
+        return {all, all, all, zero, zero, zero};
     }
 
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
@@ -121,17 +150,13 @@ private:
         return Below::counted(i, inside);
     }
 
-    /// Returns the wall pairs inside the support.
+    /// Returns the wall pairs inside the support; sigma: what walls mirror of each lane's stress.
     template <bool moving>
     [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
-                                                   ForceWalls<Lane>& out, WallPower<Lane>* power_out) const
+                                                   const Sym3<V>& sigma, ForceWalls<Lane>& out, WallPower<Lane>* power_out) const
     {
-        const auto& p = std::as_const(*in.particles);
-        const auto s = p[field::stress];
-        const auto v = p[field::velocity];
+        const auto v = std::as_const(*in.particles)[field::velocity];
         const auto narrow = [&](const double* column) { return load_narrow<V>(column + i.first); };
-        const Sym3<V> sigma{narrow(s.column[0]), narrow(s.column[1]), narrow(s.column[2]),
-                            narrow(s.column[3]), narrow(s.column[4]), narrow(s.column[5])};
         const Vec3<V> velocity{narrow(v.column[0]), narrow(v.column[1]), narrow(v.column[2])};
         ForceWalls<V> sums{};
         WallPower<V> power{};
@@ -171,9 +196,10 @@ private:
         return pairs;
     }
 
-    /// `power`: of walls that move; none: they stand still.
+    /// `power`: of walls that move; none: they stand still. `loaded`: what walls add to pressures; none: nothing.
     KUZURE_INLINE void update_force(const StepInput& in, const ForceSums<Lane>& rows, const ForceWalls<Lane>& wall_rows, bool walled,
-                                    const WallPower<Lane>* power, const Lanes& lanes, unsigned awake, Tally<U>& tally)
+                                    const WallPower<Lane>* power, const ForceWalls<Lane>* loaded, const Lanes& lanes, unsigned awake,
+                                    Tally<U>& tally)
     {
         auto& p = *in.particles;
         const auto& was = std::as_const(p);
@@ -187,7 +213,7 @@ private:
         const U per_rho = factor / rho;
 
         const Vec3<U> stress = per_rho * (sums.force + sigma * sums.grad_one);
-        Vec3<U> artificial{zero, zero, zero}, wall = artificial;
+        Vec3<U> artificial{zero, zero, zero}, wall = artificial, by_loads = artificial;
         if constexpr (M::tensile) {
             const auto tau = lane_by_lane<Sym3, U>([&](int k) {
                 const Tension<T>& t = tension_[lanes.particle(k)];
@@ -206,7 +232,11 @@ private:
             }
         } else forget_contact(p, lanes);
         if (p.has(field::wall_force)) tell_of_walls(p, lanes, wall, walled);
-        const Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
+        Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
+        if (!in.loads.empty()) {
+            by_loads = load_acceleration(in, U(2.0) * per_rho * sums.grad_one, loaded, lanes, soil.rho0, rho);
+            body = body + by_loads;
+        }
         Vec3<U> a = ((stress + viscous) + (artificial + wall)) + body;
         // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)
         const U mu(in.forces.damping), kick = half_dt + half_next;
@@ -218,7 +248,27 @@ private:
         p[field::acceleration].store(lanes.at, a, lanes.n);
         if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) Below::detect_calm(in, lanes, a, v, awake);
 
-        report(in, lanes, Moved{x, u, v, a}, Forces{viscous, artificial, wall}, U(volume_) * soil.rho0, walled, tally);
+        report(in, lanes, Moved{x, u, v, a}, Forces{viscous, artificial, wall, by_loads}, U(volume_) * soil.rho0, walled, tally);
+    }
+    /// What loads do to each lane, m/s^2. A pressure p that follows its face is what a tension p of the particle and of all around it would
+    /// do, sum_j V_j 2 p grad W and at walls sum f P (p grad W): nothing inside soil and beside walls, p on the area of a free face.
+    /// `inward`: of a unit of pressure without walls.
+    KUZURE_INLINE Vec3<U> load_acceleration(const StepInput& in, Vec3<U> inward, const ForceWalls<Lane>* wall_rows, const Lanes& lanes,
+                                            U rho0, U rho) const
+    {
+        auto& p = *in.particles;
+        const auto push = p[field::load_push];
+        const U mass = U(volume_) * rho0;
+        Vec3<U> a = lane_by_lane<U>([&](int k) { return load_on(in, lanes.particle(k)).pressure; }) * inward;
+        if (wall_rows) {
+            const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(*wall_rows, lanes.first);
+            a = a + (U(scale_) * mass / (rho * rho)) * (w.held + w.pressing);
+        }
+        for (int k = 0; k < lanes.n; ++k)
+            if (load_on(in, lanes.at + k).measured)
+                push.set(lanes.at + k, lane(mass, k) * Vector{lane(a.x, k), lane(a.y, k), lane(a.z, k)});
+        const U share = lane_by_lane<U>([&](int k) { return load_on(in, lanes.particle(k)).share; });
+        return a + (share / mass) * std::as_const(p)[field::load_push].template load<U>(lanes.at);
     }
     /// All that walls do to each lane; of viscosity the strain stage has left it.
     static void tell_of_walls(Particles& p, const Lanes& lanes, Vec3<U> wall, bool walled)
@@ -234,7 +284,7 @@ private:
         Vec3<U> x, u, v, a;
     };
     struct Forces { // per unit of mass, m/s^2
-        Vec3<U> viscous, artificial, wall;
+        Vec3<U> viscous, artificial, wall, loads;
     };
     /// Work of each force, half of the step before and half of the one to come; exact sums of rounded addends. Maxima; displacement and
     /// drift are those of the step to come.
@@ -253,6 +303,7 @@ private:
         take(tally.energy.viscous, tally.later.viscous, f.viscous);
         if constexpr (M::pushes) take(tally.energy.stabilising, tally.later.stabilising, f.artificial);
         if (walled) take(tally.energy.wall, tally.later.wall, f.wall);
+        if (!in.loads.empty()) take(tally.energy.loads, tally.later.loads, f.loads);
         if (in.forces.damping > 0) take(tally.energy.damping, tally.later.damping, -(half * mu) * (m.u + coming));
         const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
         const Vec3<U> moved = (fma(next, coming, m.x) - p[field::sorted_position].template load<U>(lanes.at)) - flown,

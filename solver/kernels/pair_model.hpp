@@ -21,6 +21,12 @@ struct StepForces {
 /// below a speed); let those fall asleep who are calm among calm neighbours, by the step before; keep the state of sleepers.
 enum class SleepStage { Off, Detect, Freeze, Frozen };
 
+/// What acts of a load now: a pressure that follows its face (Pa), or a share of the force that its particles have been given.
+struct LoadNow {
+    double pressure = 0, share = 0;
+    bool measured = false; // its particles are given the force of that pressure
+};
+
 /// What a step asks of a model, the same for all stages and clusters.
 struct StepInput {
     Particles* particles; // with the model's fields
@@ -38,6 +44,7 @@ struct StepInput {
     Vector frame_way{};       // m, how far it will have flown since the last sort, after the step whose displacement is told
     double energy_unit;       // J
     std::optional<Vector> low = {}, high = {};
+    std::span<const LoadNow> loads = {};           // none: `particles` has no field::load
     SleepStage sleep = SleepStage::Off;            // else `particles` has field::activity
     double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest
 };

@@ -206,6 +206,8 @@ struct Kept {
     Vector slip{};
     double pressed = 0, friction = 0; // the latter: the most that it carries
     double plastic_strain = 0, opened = 0;
+    double pressure = 0; // of a load that follows its face, Pa
+    Vector push{};       // of one that does not, N
 };
 constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
 
@@ -303,9 +305,9 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
 }
 
 // ---- stage "force" -----------------------------------------------------------------------------------------------------
-/// Energies taken (J) by viscosity, artificial stress, walls and damping.
+/// Energies taken (J) by viscosity, artificial stress, walls, damping and loads.
 struct Taken {
-    double viscous = 0, stabilising = 0, wall = 0, damping = 0, moved_wall = 0;
+    double viscous = 0, stabilising = 0, wall = 0, damping = 0, moved_wall = 0, loads = 0;
 };
 struct Forced {
     Vector acceleration, velocity;
@@ -328,6 +330,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     const Vector gravity = e.gravity.value_or(Vector{});
     Forced of_i;
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
+    Vector inward{};                        // of a unit of pressure on free faces, 1/m
     Vector area{};                          // of Coulomb faces, along their normals, 1/m
     double limit = 0, approach = 0;
     double held_power[2] = {}, push_power[2] = {}; // of walls in this step and the next, W/m^3
@@ -345,6 +348,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const Particle j = particle(soil, l, s);
         const Vector grad = kernel.gradient(x_ij);
         stress = stress + j.volume * ((i.stress + j.stress) * grad);
+        inward = inward + 2 * j.volume * grad;
         if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
         if (e.stress_diffusion)
             of_i.stress_rate = of_i.stress_rate + stress_diffusion(e.stress_diffusion->zeta, s.how.h, gravity, material, i, j, grad);
@@ -362,6 +366,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
                    wall.surface == scene::Surface::Coulomb ? std::tan(wall.friction_angle) : 0.0};
         }
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
+        inward = inward + mirror * i.volume * crossing(wall, face, grad);
         const Vector v_w[2] = {velocity_of(w, face, s.motion), velocity_of(w, face, s.next_motion)};
         for (int t = 0; t < 2; ++t)
             (wall.surface == scene::Surface::Coulomb ? push_power : held_power)[t] += dot(crossing(wall, face, traction), v_w[t]);
@@ -404,17 +409,20 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         }
     }
     const Vector water = (-1 / material.density) * PoreWater::from(e).at(i.x).gradient;
-    const Vector free = (1 / i.density) * (stress + art) + kept.acceleration + by_walls + gravity + water;
+    // A pressure on free faces is what a tension of the particle and of all around it would do.
+    const double mass = i.density * i.volume;
+    const Vector load = (kept.pressure / i.density) * inward + (1 / mass) * kept.push;
+    const Vector free = (1 / i.density) * (stress + art) + kept.acceleration + by_walls + gravity + water + load;
     // Damping over the whole kick, with the mean of the velocities before and after it: a = free - mu (v- + v+)/2, v+ = v- + kick a.
     const double kick = (dt + next) / 2;
     of_i.acceleration = (1 / (1 + s.damping * kick / 2)) * (free - s.damping * i.v);
     of_i.velocity = i.v + (dt / 2) * of_i.acceleration;
     const Vector then = i.v + kick * of_i.acceleration;
-    const double mass = i.density * i.volume;
     const auto taken = [&](Vector v, double time, double watts) {
         const auto by = [&](Vector a) { return -mass * time * dot(a, v); };
         const double given = mass * time * watts;
-        return Taken{by(kept.acceleration), by((1 / i.density) * art), by(by_walls) + given, by((-s.damping / 2) * (i.v + then)), -given};
+        return Taken{
+            by(kept.acceleration), by((1 / i.density) * art), by(by_walls) + given, by((-s.damping / 2) * (i.v + then)), -given, by(load)};
     };
     of_i.before = taken(i.v, dt / 2, power[0]), of_i.coming = taken(then, next / 2, power[1]);
     return of_i;

@@ -11,11 +11,11 @@ namespace kuzure {
 /// Energy that left the mechanical ledger, J (J/m in 2-D), one number or one lane of numbers each. Every addend is a multiple
 /// of one unit fixed for the run, so the sums are exact and equal in any order. Stabilising: artificial stress and stress
 /// diffusion, which may give as well as take. Wall: as if all walls stood still; moved_wall: what their motion takes, negative where
-/// they push.
+/// they push. Loads: what they take, negative where they push.
 template <class V> struct Energies {
-    V plastic{}, viscous{}, wall{}, damping{}, stabilising{}, moved_wall{};
-    static constexpr std::tuple members{&Energies::plastic, &Energies::viscous,     &Energies::wall,
-                                        &Energies::damping, &Energies::stabilising, &Energies::moved_wall};
+    V plastic{}, viscous{}, wall{}, damping{}, stabilising{}, moved_wall{}, loads{};
+    static constexpr std::tuple members{&Energies::plastic,     &Energies::viscous,    &Energies::wall, &Energies::damping,
+                                        &Energies::stabilising, &Energies::moved_wall, &Energies::loads};
 };
 using EnergySums = Energies<double>;
 

@@ -23,9 +23,10 @@ std::int64_t sum_of_units(std::int64_t units, std::int64_t more);
 
 /// What left the mechanical ledger since the start, in whole units. Exact; addition in any order.
 struct DissipatedUnits {
-    std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0, stabilising = 0, moved_wall = 0;
+    std::int64_t plastic = 0, viscous = 0, wall = 0, damping = 0, stabilising = 0, moved_wall = 0, loads = 0;
     static constexpr std::tuple members{&DissipatedUnits::plastic, &DissipatedUnits::viscous,     &DissipatedUnits::wall,
-                                        &DissipatedUnits::damping, &DissipatedUnits::stabilising, &DissipatedUnits::moved_wall};
+                                        &DissipatedUnits::damping, &DissipatedUnits::stabilising, &DissipatedUnits::moved_wall,
+                                        &DissipatedUnits::loads};
     void add(const DissipatedUnits& o)
     {
         for_each_member(*this, o, [](std::int64_t& units, std::int64_t more) { units = sum_of_units(units, more); });

@@ -2,6 +2,8 @@
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
 #include <fmt/format.h>
 #include <limits>
 
@@ -18,6 +20,7 @@ Scene settling_scene(const Scene& scene, double end, bool held)
     std::erase_if(s.bodies, [](const scene::Body& b) { return !scene::rests(b); });
     std::erase_if(s.walls, [](const scene::Wall& w) { return !w.present; });
     s.events.clear(), s.probes.clear();
+    std::erase_if(s.loads, [&](const scene::Load& l) { return !l.present || (!l.body.empty() && scene::body_named(s, l.body) < 0); });
     for (auto& b : s.bodies) b.velocity = {};
     for (auto& soil : s.soils) {
         soil.softening.reset(), soil.dilation_decay.reset(), soil.rate_friction.reset();
@@ -102,13 +105,14 @@ double settled_acceleration(const Scene& s) { return 0.02 * gravity(s); }
 
 Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& filling, const RunOptions& options, Settling& s)
 {
-    // Soil that stands sinks by its elastic strain under its own weight at most, rho g H^2/E, from zero stress.
+    // Soil that stands sinks by its elastic strain under its own weight and loads at most, (rho g H + p) H/E, from zero stress.
     double most = scene.space.spacing;
     const double height = filling.soil_height();
     for (const auto& b : scene.bodies)
         if (scene::rests(b)) {
             const auto& soil = scene.soils[std::size_t(b.soil)];
-            most = std::max(most, scene.space.spacing + soil.density * gravity(scene) * height * height / soil.young);
+            most = std::max(most, scene.space.spacing +
+                                      (soil.density * gravity(scene) * height + scene::largest_load(scene)) * height / soil.young);
         }
     RunOptions inner{options.arithmetic, options.recut_every, options.blocks_per_rank};
     inner.settles = true;
@@ -132,6 +136,7 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
         p[field::id].set(i, found.id), p[field::velocity].set(i, start_velocity(scene, scene.bodies[std::size_t(found.body)])),
             p[field::plastic_strain].set(i, 0.0);
         p[field::origin].set(i, p[field::position][i]), p[field::sorted_position].set(i, p[field::position][i]);
+        if (p.has(field::load)) p[field::load].set(i, 0);
         if (s.held && p.has(field::opened_volume)) p[field::opened_volume].set(i, 0.0);
     }
     return p;

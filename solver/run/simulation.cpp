@@ -1,5 +1,7 @@
 #include "solver/run/simulation.hpp"
+#include "solver/run/loads.hpp"
 #include "solver/run/start.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/step_limits.hpp"
 #include <limits>
@@ -40,7 +42,12 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options)
         const Vector g = scene_.effects.gravity.value_or(Vector{});
         clock_.extremes.acceleration2 = dot(g, g);
         for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
-        if (model_->moves_first()) evaluate_anew();
+        if (model_->moves_first()) {
+            Scene nothing = scene_;
+            for (auto& l : nothing.loads) l.present = false;
+            begin_loads(nothing);
+            evaluate_anew();
+        }
         clock_.energy_at_start = ledger(clock_.next).sum(); // with the half kick to come before it, as at every other time
     });
 }
@@ -94,6 +101,8 @@ void Simulation::prepare()
     model_->require_fields(particles_,
                            std::ranges::any_of(scene_.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; }));
     if (remembering_) particles_.require(field::opened_volume);
+    if (!scene_.loads.empty()) particles_.require(field::load, field::load_push);
+    loads_ = loads_now(scene_);
     if (wall_forces_.any()) particles_.require(field::wall_force);
     if (scene_.accuracy.sleep_below > 0) {
         particles_.require(field::activity);
@@ -261,7 +270,7 @@ Requests Simulation::reduce(const PassResult& result, Requests mine)
 
 Vector Simulation::frame(double time) const
 {
-    if (!scene_.walls.empty() || !scene_.events.empty()) return {};
+    if (!scene_.walls.empty() || !scene_.events.empty() || !scene_.loads.empty()) return {};
     Vector momentum{};
     double mass = 0;
     for (std::size_t k = 0; k < scene_.bodies.size(); ++k) {
@@ -287,6 +296,7 @@ StepInput Simulation::step_input(double dt, double next)
                  .energy_unit = clock_.energy_unit,
                  .low = scene_.space.low,
                  .high = scene_.space.high,
+                 .loads = loads_,
                  .sleep = sleep_stage(),
                  .calm_speed = scene_.accuracy.sleep_below,
                  .detection_interval = double(sleep_interval_ - 1) * dt};
@@ -314,9 +324,9 @@ SleepStage Simulation::sleep_stage() const
     // Damping settles a state: there soil is slow before it is at rest.
     if (scene_.accuracy.sleep_below == 0 || damping() > 0) return SleepStage::Off;
     const auto shoves = [&](const scene::Event& e) {
-        return e.move && clock_.time >= scene::begin_of(e) && clock_.time < scene::end_of(e);
+        return scene::load_changes(e, clock_.time) || (e.move && clock_.time >= scene::begin_of(e) && clock_.time < scene::end_of(e));
     };
-    if (std::ranges::any_of(start_scene_.events, shoves)) return SleepStage::Off; // a wall comes upon sleepers
+    if (std::ranges::any_of(start_scene_.events, shoves)) return SleepStage::Off; // a wall or a load comes upon sleepers
     const auto phase = clock_.step % sleep_interval_;
     return phase == 0 ? SleepStage::Detect : phase == 1 ? SleepStage::Freeze : SleepStage::Frozen;
 }
@@ -357,6 +367,7 @@ double Simulation::residual(const Ledger& l) const
     if (clock_.events > 0)
         drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.events), std::fabs(l.dissipated.moved_wall),
                          std::fabs(clock_.energy_at_start)});
+    if (!scene_.loads.empty()) drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.dissipated.loads)});
     const double scale =
         drop > 0 ? drop : std::max({std::fabs(l.state.potential), l.state.kinetic, l.state.elastic, std::fabs(clock_.energy_at_start)});
     return scale > 0 ? excess / scale : 0;

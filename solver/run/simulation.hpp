@@ -122,6 +122,8 @@ private:
     void enter_stage(double time);
     /// Takes the soil of bodies away that went, and puts that of those there that came. Collective.
     void change_bodies(const Scene& before);
+    /// Soil that loads push, which were not there before, is found, and its faces are measured. Collective.
+    void begin_loads(const Scene& before);
     /// Throws NumbersFailed where a wall or body came to stand in soil. Collective.
     void require_room(const Scene& before);
     /// What changes little by little takes its values of the end of a step; gives the scene before, where something does. Collective.
@@ -171,6 +173,7 @@ private:
     Particles particles_;
     std::optional<Settling> settled_;
     PoreWater water_;
+    std::vector<LoadNow> loads_;
     bool evolving_ = false, remembering_ = false;
     std::int64_t sleep_interval_ = 1; // steps between detections, where soil may sleep
     Clock clock_;

@@ -1,4 +1,5 @@
 // What events do to a run: the part of Simulation that changes its scene.
+#include "solver/run/loads.hpp"
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/events.hpp"
@@ -28,7 +29,7 @@ void Simulation::begin_events()
         for (Index i = 0; i < particles_.size(); ++i) activity.set(i, std::int32_t(Activity::Moves));
     }
     for (const auto& m : soils_) clock_.extremes.signal = std::max(clock_.extremes.signal, m.c_p);
-    if (model_->moves_first()) evaluate_anew();
+    if (model_->moves_first()) begin_loads(scene_before), evaluate_anew();
     else rebuild(true, clock_.time);
     require_room(scene_before);
     const double taken = before - ledger(clock_.next).sum(); // with the half kick to come before it, as at the start
@@ -41,7 +42,22 @@ void Simulation::enter_stage(double time)
     scene_ = scene::stage_of(start_scene_, clock_.events, time);
     std::ranges::copy(materials_of(scene_), soils_.begin()); // others look at them where they are
     water_ = PoreWater::from(scene_.effects);
+    loads_ = loads_now(scene_);
     model_->renew(scene_.interactions());
+}
+
+void Simulation::begin_loads(const Scene& before)
+{
+    if (scene_.loads.empty()) return;
+    take_from_loads(loads_come(scene_, before), particles_);
+    const auto fresh = loads_come(before, scene_);
+    if (fresh.empty()) return;
+    give_to_loads(comm_, scene_, filling_, fresh, clock_.time, options_.settles, particles_);
+    std::ranges::fill(loads_, LoadNow{});
+    for (const int l : fresh) loads_[std::size_t(l)] = {.pressure = unit_pressure(scene_), .measured = true};
+    evaluate_anew();
+    set_pushes(comm_, scene_, fresh, particles_);
+    loads_ = loads_now(scene_);
 }
 
 void Simulation::change_bodies(const Scene& before)

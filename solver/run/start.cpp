@@ -2,6 +2,7 @@
 #include "solver/run/blocks.hpp"
 #include "solver/run/initial_stress.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 
@@ -93,7 +94,7 @@ double energy_scale(const Scene& scene, const scene::Filling& filling, std::span
     for (const auto& e : scene.events)
         if (e.gravity) g = std::max(g, length(*e.gravity));
     const double shoved = scene::fastest_wall(scene);
-    double scale = 0;
+    double scale = scene::largest_load(scene) * scene.particle_volume() * double(filling.soil_count());
     for (std::size_t k = 0; k < scene.bodies.size(); ++k) {
         const auto& body = scene.bodies[k];
         const Material& m = soils[body.soil];

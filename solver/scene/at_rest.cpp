@@ -1,4 +1,5 @@
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/step_limits.hpp"
 #include <algorithm>
@@ -181,6 +182,7 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
     if (std::none_of(scene.bodies.begin(), scene.bodies.end(), rests)) return {};
     const Effects& effects = scene.effects;
     if (const auto& g = effects.gravity; !g || g->x != 0 || g->y != 0 || !(g->z < 0)) return "gravity does not point straight down";
+    if (loaded_at_start(scene)) return "a load acts from the start";
     if (effects.pore_pressure)
         for (const auto& corner : effects.pore_pressure->table)
             if (corner[1] != effects.pore_pressure->table.front()[1]) return "the water table is not level";

@@ -1,6 +1,7 @@
 #include "solver/scene/check.hpp"
 #include "solver/scene/at_rest.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/map_grid.hpp"
 #include "solver/scene/numbers.hpp"
 #include "solver/scene/rules.hpp"
@@ -112,6 +113,7 @@ void check_parts(const Scene& scene, StepLimit limit, Rules& rules)
 void check_particles(const Scene& scene, const Filling& filling, Rules& rules)
 {
     check_edges(scene, rules);
+    check_loaded_soil(scene, filling, rules.issues);
     check_maps(scene, filling, rules);
     for (auto& n : dimensionless_numbers(scene, filling))
         if (!n.warning.empty()) rules.warning(n.name, n.warning);

@@ -1,6 +1,7 @@
 #include "solver/scene/effects_list.hpp"
 #include "solver/scene/at_rest.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/rules.hpp"
 #include "solver/scene/step_limits.hpp"
@@ -198,6 +199,7 @@ private:
             const Event& e = scene_.events[std::size_t(k)];
             note("event", true, text("{}: {}", time_in_words(e), in_words(scene_, e)));
         }
+        for (std::size_t l = 0; l < scene_.loads.size(); ++l) note("load", true, in_words(scene_, int(l)));
         const auto resting = std::count_if(scene_.bodies.begin(), scene_.bodies.end(), rests);
         note("stress_at_rest", resting > 0,
              resting ? text("{} of {} bodies start with K0 stress under their own weight", resting, scene_.bodies.size())

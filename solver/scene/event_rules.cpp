@@ -1,5 +1,6 @@
 // What events may say: of themselves, of each other, of names.
 #include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
 #include "solver/scene/motion.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -22,6 +23,7 @@ std::set<std::string> touched(const Event& e)
     if (!e.water.empty()) keys.insert("water");
     if (e.damping) keys.insert("damping");
     if (e.move) keys.insert("the motion of \"" + e.move->wall + "\"");
+    if (e.load) keys.insert("the factor of \"" + e.load->name + "\"");
     for (const auto& c : e.soils) {
         const auto add = [&](bool there, const char* key) {
             if (there) keys.insert(fmt::format("soil {}.{}", c.soil, key));
@@ -46,11 +48,12 @@ void check_names(const Scene& s, Issues& issues)
         const auto [first, fresh] = keys.emplace(name, key);
         if (!fresh)
             issues.push_back({Severity::Error, key + ".name",
-                              fmt::format("expected a name that no other wall or body has, found \"{}\" again; rename one", name),
+                              fmt::format("expected a name that no other wall, body or load has, found \"{}\" again; rename one", name),
                               first->second + ".name"});
     };
     for (std::size_t b = 0; b < s.bodies.size(); ++b) meet(s.bodies[b].name, fmt::format("body.{}", b));
     for (std::size_t w = 0; w < s.walls.size(); ++w) meet(s.walls[w].name, fmt::format("wall.{}", w));
+    for (std::size_t l = 0; l < s.loads.size(); ++l) meet(s.loads[l].name, fmt::format("load.{}", l));
 
     std::map<std::string, std::string> probes;
     for (std::size_t k = 0; k < s.probes.size(); ++k) {
@@ -98,6 +101,21 @@ void check_soil_changes(const Scene& s, const Event& e, const std::string& key, 
     }
 }
 
+bool is_named(const Scene& s, const std::string& name)
+{
+    return body_named(s, name) >= 0 || wall_named(s, name) >= 0 || load_named(s, name) >= 0;
+}
+std::string all_names(const Scene& s)
+{
+    std::vector<std::string> all;
+    const auto take = [&](const auto& parts) {
+        for (const auto& part : parts)
+            if (!part.name.empty()) all.push_back(part.name);
+    };
+    take(s.bodies), take(s.walls), take(s.loads);
+    return all.empty() ? std::string("none; give that wall a name = \"...\"") : fmt::format("{}", fmt::join(all, ", "));
+}
+
 /// What an event says of itself.
 void check_event(const Scene& s, const Event& e, const std::string& key, Issues& issues)
 {
@@ -121,18 +139,12 @@ void check_event(const Scene& s, const Event& e, const std::string& key, Issues&
     at_once(!e.add.empty(), "add"), at_once(!e.remove.empty(), "remove"), at_once(e.damping.has_value(), "damping");
     at_once(bool(e.shaking.rows), "shaking");
     for (const auto* names : {&e.add, &e.remove})
-        for (const auto& name : *names) {
-            if (body_named(s, name) >= 0 || wall_named(s, name) >= 0) continue;
-            std::vector<std::string> all;
-            for (const auto& b : s.bodies)
-                if (!b.name.empty()) all.push_back(b.name);
-            for (const auto& w : s.walls)
-                if (!w.name.empty()) all.push_back(w.name);
-            error(
-                names == &e.add ? "add" : "remove",
-                fmt::format("expected the name of a wall or body, found \"{}\"; the names here: {}", name,
-                            all.empty() ? std::string("none; give that wall a name = \"...\"") : fmt::format("{}", fmt::join(all, ", "))));
-        }
+        for (const auto& name : *names)
+            if (!is_named(s, name))
+                error(names == &e.add ? "add" : "remove",
+                      fmt::format("expected the name of a wall, body or load, found \"{}\"; the names here: {}", name, all_names(s)));
+    if (e.load && load_named(s, e.load->name) < 0)
+        error("load.name", fmt::format("expected the name of a load, found \"{}\"; the names here: {}", e.load->name, all_names(s)));
     for (const auto& name : e.add)
         if (const int b = body_named(s, name); b >= 0 && s.bodies[std::size_t(b)].stress == InitialStress::AtRest)
             error("add", fmt::format("expected a body without stress, found {} \"at rest\": soil that is added carries nothing yet; let "
@@ -175,6 +187,7 @@ void check_order(const Scene& s, Issues& issues)
     Scene now = s;
     const auto present = [&](const std::string& name) {
         if (const int b = body_named(now, name); b >= 0) return now.bodies[std::size_t(b)].present;
+        if (const int l = load_named(now, name); l >= 0) return now.loads[std::size_t(l)].present;
         const int w = wall_named(now, name);
         return w >= 0 && now.walls[std::size_t(w)].present;
     };
@@ -187,7 +200,7 @@ void check_order(const Scene& s, Issues& issues)
         for (const auto* names : {&e.remove, &e.add})
             for (const auto& name : *names) {
                 const bool removes = names == &e.remove;
-                if (body_named(s, name) < 0 && wall_named(s, name) < 0) continue;
+                if (!is_named(s, name)) continue;
                 if (!here.insert(name).second)
                     issues.push_back(
                         {Severity::Error, key(k), fmt::format("expected each name once in an event, found {} again", name), {}});
@@ -211,6 +224,7 @@ bool has_course(const Event& e) { return lasting(e) && touched(e).size() > std::
 void check_names_and_events(const Scene& s, Issues& issues)
 {
     check_names(s, issues);
+    check_loads(s, issues);
     const auto before = issues.size();
     for (std::size_t k = 0; k < s.events.size(); ++k) check_event(s, s.events[k], fmt::format("event.{}", k), issues);
     const bool sound =

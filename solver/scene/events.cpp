@@ -62,19 +62,23 @@ double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 
 int body_named(const Scene& s, const std::string& name) { return named(s.bodies, name); }
 int wall_named(const Scene& s, const std::string& name) { return named(s.walls, name); }
+int load_named(const Scene& s, const std::string& name) { return named(s.loads, name); }
 void set_present(Scene& s, const std::string& name, bool there)
 {
     if (const int b = body_named(s, name); b >= 0) s.bodies[std::size_t(b)].present = there;
     if (const int w = wall_named(s, name); w >= 0) s.walls[std::size_t(w)].present = there;
+    if (const int l = load_named(s, name); l >= 0) s.loads[std::size_t(l)].present = there;
 }
 
-bool GroundMotion::operator==(const GroundMotion& o) const { return rows == o.rows || (rows && o.rows && *rows == *o.rows); }
+bool Record::operator==(const Record& o) const { return rows == o.rows || (rows && o.rows && *rows == *o.rows); }
 
 double begin_of(const Event& e) { return e.at ? *e.at : e.from.value_or(0); }
 double end_of(const Event& e)
 {
-    const double end = e.at ? *e.at : e.to.value_or(0);
-    return e.shaking.rows ? std::max(end, begin_of(e) + e.shaking.rows->back()[0]) : end;
+    double end = e.at ? *e.at : e.to.value_or(0);
+    if (e.shaking.rows) end = std::max(end, begin_of(e) + e.shaking.rows->back()[0]);
+    if (e.move && e.move->path.rows) end = std::max(end, begin_of(e) + e.move->path.rows->back()[0]);
+    return end;
 }
 bool lasting(const Event& e) { return end_of(e) > begin_of(e); }
 
@@ -122,6 +126,8 @@ Scene stage_of(const Scene& start, int begun, double time)
                 for (std::size_t c = 0; c < e.water.size(); ++c)
                     for (const std::size_t a : {0u, 1u}) water->table[c][a] = between(water->table[c][a], e.water[c][a], share);
         }
+        if (const int l = e.load ? load_named(now, e.load->name) : -1; l >= 0)
+            move(now.loads[std::size_t(l)].factor, e.load->factor, share);
         if (e.shaking.rows) shaken = shaken + acceleration(*e.shaking.rows, time - begin_of(e));
     }
     for (const int w : moving_walls(start)) now.walls[std::size_t(w)].pose = pose_at(start, w, begun, time);
@@ -178,6 +184,12 @@ std::string name_of_body(const Scene& s, int body)
     return fmt::format("body {}", name.empty() ? std::to_string(body) : name);
 }
 
+std::string name_of_load(const Scene& s, int load)
+{
+    const auto& name = s.loads[std::size_t(load)].name;
+    return fmt::format("load {}", name.empty() ? std::to_string(load) : name);
+}
+
 std::string time_in_words(const Event& e)
 {
     if (!lasting(e)) return fmt::format("at t = {:.6g} s", begin_of(e));
@@ -187,7 +199,9 @@ std::string time_in_words(const Event& e)
 std::string in_words(const Scene& s, const Event& e)
 {
     std::vector<std::string> parts;
-    const auto piece = [&](const std::string& name) { return (body_named(s, name) >= 0 ? "body " : "wall ") + name; };
+    const auto piece = [&](const std::string& name) {
+        return (body_named(s, name) >= 0 ? "body " : load_named(s, name) >= 0 ? "load " : "wall ") + name;
+    };
     for (const auto& name : e.remove) parts.push_back(piece(name) + " is removed");
     for (const auto& name : e.add) parts.push_back(piece(name) + " is added");
     for (const auto& c : e.soils) {
@@ -213,8 +227,11 @@ std::string in_words(const Scene& s, const Event& e)
         if (m.turn)
             how += fmt::format("{} turning by {:.6g} deg/s about [{:.6g} {:.6g} {:.6g}]", how.empty() ? "" : " and", degrees(m.turn->rate),
                                m.turn->center.x, m.turn->center.y, m.turn->center.z);
+        if (m.path.rows) how = fmt::format(" along {} rows of {}", m.path.rows->size(), m.path.file);
+        if (m.ramp > 0) how += fmt::format(", coming to that and to rest in {:.6g} s each", m.ramp);
         parts.push_back(fmt::format("wall {} moves{}", m.wall, how));
     }
+    if (e.load) parts.push_back(fmt::format("{:.6g} of load {} acts", e.load->factor, e.load->name));
     if (e.damping) parts.push_back(*e.damping > 0 ? fmt::format("damping {:.6g} of critical", *e.damping) : std::string("no damping"));
     return fmt::format("{}", fmt::join(parts, "; "));
 }

@@ -21,21 +21,23 @@ double next_event_after(const Scene&, double time);
 
 /// The scene at `time` (s) once the first `begun` events of their order have begun. `start`: the scene at its start.
 Scene stage_of(const Scene& start, int begun, double time);
-/// Number of the body or wall with a name; -1 where there is none.
+/// Number of the body, wall or load with a name; -1 where there is none.
 int body_named(const Scene&, const std::string& name);
 int wall_named(const Scene&, const std::string& name);
+int load_named(const Scene&, const std::string& name);
 /// Puts it there, or takes it away.
 void set_present(Scene&, const std::string& name, bool there);
-/// Bodies and walls that an event adds before one removes them are not there at the start.
+/// Bodies, walls and loads that an event adds before one removes them are not there at the start.
 void resolve_presence(Scene&);
-/// Times (s) from which and to which a body or wall of this name is there; all time where it has none.
+/// Times (s) from which and to which a body, wall or load of this name is there; all time where it has none.
 std::vector<std::array<double, 2>> presence(const Scene&, const std::string& name);
 
 /// Soil particles of the bodies that are present.
 std::int64_t soil_present(const Scene&, const Filling&);
-/// "wall gate" or "wall 2", "body lift" or "body 0".
+/// "wall gate" or "wall 2", "body lift" or "body 0", "load footing" or "load 1".
 std::string name_of_wall(const Scene&, int wall);
 std::string name_of_body(const Scene&, int body);
+std::string name_of_load(const Scene&, int load);
 /// "at t = 2 s", "from t = 2 s to 3 s".
 std::string time_in_words(const Event&);
 /// "wall gate is removed; soil clay: cohesion 500 Pa".

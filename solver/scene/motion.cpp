@@ -8,9 +8,6 @@
 namespace kuzure::scene {
 namespace {
 
-/// Seconds that a move has gone on at a time.
-double gone(const Event& e, double time) { return std::clamp(time - begin_of(e), 0.0, end_of(e) - begin_of(e)); }
-
 /// Turn by an angle about an axis through the origin. Rodrigues' formula.
 Pose turn_about(Vector axis, double angle)
 {
@@ -20,10 +17,35 @@ Pose turn_about(Vector axis, double angle)
     // The rows of a turn are the axes turned back.
     return {{row({1, 0, 0}), row({0, 1, 0}), row({0, 0, 1})}, {}};
 }
-/// What a move has done after so many seconds: turned about its center, then carried along with it.
-Pose done(const WallMove& m, double seconds)
+/// Way of a record (m) after so many seconds: straight from row to row, then at its end.
+Vector along(const Record& path, double seconds)
 {
+    const auto& rows = *path.rows;
+    const auto place = [](const std::array<double, 4>& row) { return Vector{row[1], row[2], row[3]}; };
+    const auto after = std::upper_bound(rows.begin(), rows.end(), seconds, [](double t, const auto& row) { return t < row[0]; });
+    if (after == rows.begin()) return place(rows.front());
+    if (after == rows.end()) return place(rows.back());
+    const auto &a = *(after - 1), &b = *after;
+    return place(a) + ((seconds - a[0]) / (b[0] - a[0])) * (place(b) - place(a));
+}
+/// Seconds at full speed that go as far as a move of `whole` seconds has gone after so many, whose speed grows and ends in `ramp`.
+double at_full_speed(double seconds, double whole, double ramp)
+{
+    if (ramp == 0) return seconds;
+    const double left = whole - seconds;
+    if (left < ramp) return whole - ramp - left * left / (2 * ramp);
+    return seconds < ramp ? seconds * seconds / (2 * ramp) : seconds - ramp / 2;
+}
+/// What an event's move has done at a time (s): turned about its center, then carried along with it.
+Pose done(const Event& e, const WallMove& m, double time)
+{
+    const double whole = end_of(e) - begin_of(e), gone = std::clamp(time - begin_of(e), 0.0, whole);
     Pose p;
+    if (m.path.rows) {
+        p.shift = along(m.path, gone);
+        return p;
+    }
+    const double seconds = at_full_speed(gone, whole, m.ramp);
     if (m.turn && seconds > 0) {
         p = turn_about(m.turn->axis, seconds * m.turn->rate);
         p.shift = m.turn->center - turned(p, m.turn->center);
@@ -77,7 +99,7 @@ std::vector<int> moving_walls(const Scene& s)
 Pose pose_at(const Scene& s, int wall, int begun, double time)
 {
     Pose p;
-    for_each_move(s, wall, begun, [&](const Event& e, const WallMove& m) { p = then(p, done(m, gone(e, time))); });
+    for_each_move(s, wall, begun, [&](const Event& e, const WallMove& m) { p = then(p, done(e, m, time)); });
     return p;
 }
 
@@ -95,9 +117,14 @@ double fastest_wall(const Scene& s)
     for (const int w : moving_walls(s))
         for (const Event& e : s.events)
             if (e.move && e.move->wall == s.walls[std::size_t(w)].name) {
-                const double begin = begin_of(e), soon = begin + 1e-3 * (end_of(e) - begin);
-                const double way = farthest_way(s.walls[std::size_t(w)].shape, pose_at(s, w, all, begin), pose_at(s, w, all, soon));
-                most = std::max(most, way / (soon - begin));
+                const auto meet = [&](double from, double to) {
+                    const double way = farthest_way(s.walls[std::size_t(w)].shape, pose_at(s, w, all, from), pose_at(s, w, all, to));
+                    most = std::max(most, way / (to - from));
+                };
+                const double begin = begin_of(e), middle = (begin + end_of(e)) / 2; // where it is fastest
+                if (const auto& rows = e.move->path.rows)
+                    for (std::size_t k = 1; k < rows->size(); ++k) meet(begin + (*rows)[k - 1][0], begin + (*rows)[k][0]);
+                else meet(middle, middle + 1e-3 * (end_of(e) - begin));
             }
     return most;
 }
@@ -127,6 +154,12 @@ template <class Error> void check_periods(const Scene& s, const WallMove& m, Err
 {
     const auto& periodic = s.space.periodic;
     const double along[3] = {m.velocity.x, m.velocity.y, m.velocity.z};
+    for (std::size_t axis = 0; axis < 3 && m.path.rows; ++axis)
+        if (periodic[axis] && std::ranges::any_of(*m.path.rows, [&](const auto& row) { return row[axis + 1] != 0; }))
+            error(".path",
+                  fmt::format("expected no motion along {}, along which the space repeats, found some; leave one out", axis == 0   ? "x"
+                                                                                                                       : axis == 1 ? "y"
+                                                                                                                                   : "z"));
     for (int axis = 0; axis < 3; ++axis) {
         if (!periodic[std::size_t(axis)]) continue;
         const char* name = axis == 0 ? "x" : axis == 1 ? "y" : "z";
@@ -142,6 +175,30 @@ template <class Error> void check_periods(const Scene& s, const WallMove& m, Err
 }
 } // namespace
 
+namespace {
+/// What a move says of its course.
+template <class Error> void check_course(const Scene& s, const Event& e, const WallMove& m, Error error)
+{
+    const bool has_path = !m.path.file.empty();
+    if (has_path && (m.velocity != Vector{} || m.turn || m.ramp > 0))
+        error(".path", "expected a path alone, found velocity, rotation or ramp as well; leave one out");
+    if (has_path && e.from) error("", "expected at with a path, which brings its own times, found from and to; write at = instead");
+    if (!has_path && !e.from) error("", "expected from and to, since a motion begins and ends, found at; write from = and to = instead");
+    if (!has_path && m.velocity == Vector{} && !m.turn)
+        error("", "expected a velocity, a rotation or a path, found none; write, for example, velocity = [0.0, 0.0, 1.5]");
+    if (e.from && 2 * m.ramp > (1 + 1e-9) * (*e.to - *e.from))
+        error(".ramp", fmt::format("expected at most half of the motion's {:g} s, found {:g} s: it comes to its speed and to rest in it",
+                                   *e.to - *e.from, m.ramp));
+    if (!m.path.rows) return;
+    const auto& first = m.path.rows->front();
+    if (first != std::array<double, 4>{})
+        error(".path", fmt::format("expected a first row of zeros, since the wall begins where it stands, found {:g}, {:g}, {:g}, {:g}",
+                                   first[0], first[1], first[2], first[3]));
+    if (s.dimensions == 2 && std::ranges::any_of(*m.path.rows, [](const auto& row) { return row[2] != 0; }))
+        error(".path", "expected no motion along y in two dimensions, found some; leave the column y out");
+}
+} // namespace
+
 void check_move(const Scene& s, const Event& e, const std::string& key, Issues& issues)
 {
     if (!e.move) return;
@@ -149,11 +206,9 @@ void check_move(const Scene& s, const Event& e, const std::string& key, Issues& 
     const auto error = [&](const std::string& where, std::string text) {
         issues.push_back({Severity::Error, key + ".move" + where, std::move(text), {}});
     };
-    if (!e.from) error("", "expected from and to, since a motion begins and ends, found at; write from = and to = instead");
+    check_course(s, e, m, error);
     if (s.accuracy.scheme != Scheme::Staggered)
         error("", "expected accuracy.scheme = \"staggered\" where walls move, found \"leap-frog\"; leave accuracy.scheme out");
-    if (m.velocity == Vector{} && !m.turn)
-        error("", "expected a velocity or a rotation, found neither; write, for example, velocity = [0.0, 0.0, 1.5]");
     if (s.dimensions == 2 && m.velocity.y != 0)
         error(".velocity", fmt::format("expected no motion along y in two dimensions, found {:g} m/s; write 0.0", m.velocity.y));
     if (m.turn) {

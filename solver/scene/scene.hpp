@@ -84,11 +84,11 @@ struct SoilChange {
     std::optional<double> strength, stiffness; // factors of c, tan(phi) and the cut-off; of Young's modulus
     bool operator==(const SoilChange&) const = default;
 };
-/// Acceleration of the ground over time, read from a file: rows of s and m/s^2 (x, y, z).
-struct GroundMotion {
-    std::string file; // an absolute path
+/// A vector over time, read from a file: rows of s and x, y, z; straight between two rows.
+struct Record {
+    std::string file; // an absolute path; empty: none
     std::shared_ptr<const std::vector<std::array<double, 4>>> rows;
-    bool operator==(const GroundMotion&) const; // by its rows
+    bool operator==(const Record&) const; // by its rows
 };
 /// A turn about a line through `center`, which moves along, m; `axis` need not be of unit length; rad/s.
 struct Turn {
@@ -101,18 +101,39 @@ struct WallMove {
     std::string wall; // its name
     Vector velocity{};
     std::optional<Turn> turn;
+    double ramp = 0; // s, in which the motion comes to its speed, and in which it ends
+    Record path;     // m, from where the wall stands when the event begins; instead of all of these
     bool operator==(const WallMove&) const = default;
+};
+/// Pushes the free faces of soil: with a pressure, or with a traction on the area that is seen along a normal.
+struct Load {
+    std::string name = {}, body = {};    // empty: none, any
+    std::optional<Box> box = {};         // m, where the soil lies that it pushes; absent: anywhere
+    std::optional<double> pressure = {}; // Pa
+    std::optional<Vector> traction = {}; // Pa
+    std::optional<Vector> normal = {};   // of the face, outward, of any length; absent: every face
+    bool follow = false;                 // the pressure acts on the face as it is now, else as it was when the load began
+    double factor = 1;                   // how much of it acts
+    bool present = true;                 // as of a body
+    bool operator==(const Load&) const = default;
+};
+/// What an event makes of a load.
+struct LoadChange {
+    std::string name;
+    double factor = 1;
+    bool operator==(const LoadChange&) const = default;
 };
 /// A change of the scene while it runs: at one time, or linearly from one to another. What is absent stays as it was.
 struct Event {
     std::optional<double> at, from, to;       // s; at alone, or from and to
-    std::vector<std::string> add, remove;     // names of walls and bodies
+    std::vector<std::string> add, remove;     // names of walls, bodies and loads
     std::optional<Vector> gravity;            // m/s^2
-    GroundMotion shaking;                     // no rows: none
+    Record shaking;                           // m/s^2, acceleration of the ground; no rows: none
     std::vector<std::array<double, 2>> water; // x, z in m, the new water table; empty: as it was
     std::optional<double> damping;            // of critical, 1; 0: none
     std::vector<SoilChange> soils;
     std::optional<WallMove> move;
+    std::optional<LoadChange> load;
     bool operator==(const Event&) const = default;
 };
 /// A row a time in probes.csv: of a place, of one particle or of the mean of a body.
@@ -154,6 +175,7 @@ struct Scene {
     std::optional<scene::Terrain> terrain;
     scene::MapFrame map_frame; // of the terrain
     std::optional<scene::Maps> maps;
+    std::vector<scene::Load> loads;
     std::vector<scene::Event> events;
     std::vector<scene::Probe> probes;
     scene::Start start;

@@ -22,7 +22,7 @@ end = {end}
 {time}
 [soil.sand]
 density = 1600.0
-young = 4.0e6
+young = {young}
 poisson = 0.3
 cohesion = {cohesion}
 friction_angle = 30.0
@@ -55,7 +55,7 @@ history = {history}
 
 
 def tray(end=0.3, d=0.1, cohesion=0.0, length=2.0, speed=0.0, floor='surface = "smooth"', plate=None, g=-9.81, effects="", **other):
-    values = {"time": "", "more": "", "history": 0.01, "far": length + 0.4, **other}
+    values = {"time": "", "more": "", "history": 0.01, "far": length + 0.4, "young": "4.0e6", **other}
     return TRAY.format(
         end=end, d=d, cohesion=cohesion, length=length, speed=speed, floor=floor, plate=plate or floor, g=g, effects=effects, **values
     )
@@ -192,6 +192,43 @@ def work():
     check(abs(rows[-1]["wall"]) < 1e-3 * largest, f"as a wall that stands still it gives nothing: {rows[-1]['wall'] / largest:.1e}")
 
 
+def smoothly():
+    """A plate that comes to its speed in a ramp, and the same way as a path: the same push, and less of a shock."""
+    speed, end, ramp = 0.1, 0.3, 0.1
+    # stiff: the ledger counts elastic strains as small
+    still = {"end": end, "cohesion": 3e4, "time": "step = 0.0002", "history": 0.002, "young": "4.0e7"}
+    run(scene("sudden", tray(more=move("plate", (speed, 0, 0), 0.01, 0.21), **still)), "sudden")
+    ramped = move("plate", (speed, 0, 0), 0.01, 0.21).replace("] }", f"], ramp = {ramp} }}")
+    run(scene("ramped", tray(more=ramped, **still)), "ramped")
+    # the parabolas of the ramp in rows
+    rows, n = [], 200
+    for k in range(n + 1):
+        t = 0.2 * k / n
+        s = t * t / (2 * ramp) if t < ramp else 0.1 - (0.2 - t) ** 2 / (2 * ramp)
+        rows.append(f"{t:.17g},{speed * s:.17g},0")
+    runs.write("path.csv", "time,x,z\n" + "\n".join(rows) + "\n")
+    run(scene("path", tray(more='[[event]]\nat = 0.01\nmove = { wall = "plate", path = "path.csv" }', **still)), "path")
+    largest = {}
+    for name in ("sudden", "ramped"):
+        early = [r["force_x"] for r in table(name, "forces.csv") if r["wall"] == "plate" and r["time"] < 0.03]
+        largest[name] = max(abs(f - early[0]) for f in early)
+    check(
+        largest["ramped"] < 0.3 * largest["sudden"],
+        f"the push of the first 20 ms: {largest['ramped']:.0f} N, without a ramp {largest['sudden']:.0f} N",
+    )
+    a, b = table("ramped", "history.csv")[-1], table("path", "history.csv")[-1]
+    off = abs(a["moved_wall"] / b["moved_wall"] - 1)
+    check(off < 2e-3, f"along a path of {n} rows: work {off:.1e} apart")
+    excess, all_of_it = unaccounted("path")
+    check(max(map(abs, excess)) < 1e-3 * all_of_it, f"the ledger closes: {max(map(abs, excess)) / all_of_it:.1e}")
+    stop = "time.end=0.1"
+    run(runs.path("path.toml"), "path legs", 2, extra=["--set", stop])
+    run(runs.path("path.toml"), "path legs", extra=["--restart"])
+    run(runs.path("path.toml"), "path one", extra=["--set", stop])
+    run(runs.path("path.toml"), "path one", extra=["--restart"])
+    check(summary("path legs")["state_hash"] == summary("path one")["state_hash"], "legs on two ranks and one: the same bits")
+
+
 def tilt():
     """A tray that turns with its soil lifts it: its work is the potential that the soil gains."""
     turn = ", rotation = { center = [3.0, 0.0, 0.0], rate = 15.0 }"
@@ -282,6 +319,7 @@ def refused():
     repeats = tray(more=move("plate", (1.0, 0.0, 0.0))).replace(
         "spacing = 0.1", 'spacing = 0.1\nlow = [-1.0, 0.0, -1.0]\nhigh = [2.4, 0.0, 3.0]\nperiodic = ["x"]'
     )
+    runs.write("far.csv", "time,x,y\n0,1,0\n1,2,3\n")
     runs.refused(
         {
             "at": (event('at = 0.1\nmove = { wall = "plate", velocity = [1.0, 0.0, 0.0] }'), "a motion begins and ends"),
@@ -290,7 +328,15 @@ def refused():
                 'found "plat"; the names here: floor, plate, back',
             ),
             "no wall": (event(span + "move = { velocity = [1.0, 0.0, 0.0] }"), "event.0.move.wall"),
-            "no motion": (event(span + 'move = { wall = "plate" }'), "expected a velocity or a rotation"),
+            "no motion": (event(span + 'move = { wall = "plate" }'), "expected a velocity, a rotation or a path"),
+            "a long ramp": (event(span + 'move = { wall = "plate", velocity = [1.0, 0.0, 0.0], ramp = 0.06 }'), "at most half"),
+            "no such path": (event('at = 0.1\nmove = { wall = "plate", path = "nowhere.csv" }'), "nowhere.csv"),
+            "a path and a velocity": (
+                event('at = 0.1\nmove = { wall = "plate", path = "far.csv", velocity = [1.0, 0.0, 0.0] }'),
+                "a path alone",
+            ),
+            "a path that jumps": (event('at = 0.1\nmove = { wall = "plate", path = "far.csv" }'), "a first row of zeros"),
+            "a path with from": (event(span + 'move = { wall = "plate", path = "far.csv" }'), "brings its own times"),
             "along y": (event(span + 'move = { wall = "plate", velocity = [0.0, 1.0, 0.0] }'), "no motion along y"),
             "about x": (
                 event(span + 'move = { wall = "plate", rotation = { center = [0.0, 0.0, 0.0], axis = [1.0, 0.0, 0.0], rate = 1.0 } }'),
@@ -311,4 +357,4 @@ def refused():
 
 
 if __name__ == "__main__":
-    run_parts(bits, train, drawn_otherwise, work, tilt, earth_pressure, gate, added, refused)
+    run_parts(bits, train, drawn_otherwise, work, smoothly, tilt, earth_pressure, gate, added, refused)

@@ -53,7 +53,7 @@ def main():
     for line in (ROOT / "docs/scene.md").read_text().splitlines():
         if line.startswith("## "):
             section = re.sub(r"[\[\]`]", "", line[3:]).replace("Top level", "").replace("soil.<name>", "soil.*")
-            if section in ("body", "wall", "event", "probe"):
+            if section in ("body", "wall", "load", "event", "probe"):
                 section += ".*"
             section = section.replace("event.soil", "event.*.soil").replace("uncertain.key", "uncertain.key.*")
         row = re.match(r"\| `([^`]+)` \| .* \| .* \| (.*) \| .* \| (.*) \|$", line)

@@ -334,7 +334,7 @@ def refused():
         "no record": (event('at = 0.1\nshaking = "nothing.csv"'), "nothing.csv"),
         "gravity along y": (event("at = 0.1\ngravity = [0.0, 1.0, -9.81]"), "no gravity along y"),
         "stress added": (event('at = 0.1\nadd = "base"'), "expected a body without stress"),
-        "name twice": (DUG.replace('name = "left"', 'name = "floor"'), "no other wall or body has"),
+        "name twice": (DUG.replace('name = "left"', 'name = "floor"'), "no other wall, body or load has"),
         "probe of two": (DUG + '[[probe]]\nbody = "base"\nparticle = 3\n', "exactly one of point, particle, body"),
         "probe of nothing": (DUG + "[[probe]]\nparticle = 100000\n", "an id from 0 to"),
         "overlap": ((EXCAVATION + STAGES).replace("low = [6.5, 0.0, 2.0]", "low = [6.5, 0.0, 1.5]"), "an overlap"),

@@ -50,10 +50,10 @@ TEST_F(HistoryTest, HasHeaderUnitsAndRowsThatReadBack)
         EXPECT_EQ(h.last_time(), row(3).time);
     }
     EXPECT_EQ(io::read_text(file), "time,step,dt,kinetic,potential,elastic,plastic,viscous,wall,damping,residual,max_speed,height,"
-                                   "front_min_x,front_max_x,front_min_y,front_max_y,stabilising,moved_wall,events\n"
-                                   "# s,1,s,J,J,J,J,J,J,J,1,m/s,m,m,m,m,m,J,J,J\n"
-                                   "0,0,0,0.3333333333333333,0,0,0,0,0,0,0,0,0,0,0,0,-0.5,0,0,0\n"
-                                   "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5,0,0,0\n");
+                                   "front_min_x,front_max_x,front_min_y,front_max_y,stabilising,moved_wall,events,loads\n"
+                                   "# s,1,s,J,J,J,J,J,J,J,1,m/s,m,m,m,m,m,J,J,J,J\n"
+                                   "0,0,0,0.3333333333333333,0,0,0,0,0,0,0,0,0,0,0,0,-0.5,0,0,0,0\n"
+                                   "0.30000000000000004,3,0,3.3333333333333335,0,0,0,0,0,0,0,0,0,0,0,0,-0.5,0,0,0,0\n");
 }
 
 TEST_F(HistoryTest, ARowWhoseLineEndIsGoneIsKeptWhereItIsWhole)

@@ -69,6 +69,46 @@ TEST(Motion, GoesAsItsEventsSay)
     EXPECT_NEAR(way.x / 0.2, -0.5, 1e-12);
 }
 
+TEST(Motion, ComesToItsSpeedInItsRamp)
+{
+    Scene s = plate(3);
+    s.events = {moved(1, 2, {3, 0, 0}, scene::Turn{{0, 0, 0}, {0, 1, 0}, 0.5})};
+    s.events[0].move->ramp = 0.2;
+    const auto way = [&](double t) { return scene::placed(scene::pose_at(s, 1, 1, t), {0, 0, 0}).x; };
+    const auto speed = [&](double t) { return (way(t + 1e-5) - way(t - 1e-5)) / 2e-5; };
+    for (const auto& [t, v] : {std::pair{0.9, 0.0}, {1.1, 1.5}, {1.15, 2.25}, {1.5, 3.0}, {1.9, 1.5}, {1.95, 0.75}, {2.1, 0.0}})
+        EXPECT_NEAR(speed(t), v, 1e-8) << t;
+    EXPECT_NEAR(way(2), 3 * 0.8, 1e-12); // velocity times (duration less ramp)
+    // the turn keeps pace
+    EXPECT_NEAR(std::atan2(scene::pose_at(s, 1, 1, 2).turn.x.z, scene::pose_at(s, 1, 1, 2).turn.x.x), 0.5 * 0.8, 1e-12);
+    EXPECT_NEAR(scene::fastest_wall(s), 3 + 0.5 * std::hypot(0.4, 1.5), 0.2);
+    s.events[0].move->ramp = 0.5;
+    EXPECT_NEAR(way(2), 3 * 0.5, 1e-12);
+    EXPECT_NEAR(speed(1.5), 3, 1e-3);
+}
+
+TEST(Motion, FollowsAPath)
+{
+    Scene s = plate(3);
+    scene::Event e;
+    e.at = 1.0;
+    e.move = scene::WallMove{"plate"};
+    using Rows = std::vector<std::array<double, 4>>;
+    e.move->path = {"path.csv", std::make_shared<const Rows>(Rows{{0, 0, 0, 0}, {0.5, 1, 0, 0}, {1.5, 1, -1, 2}})};
+    s.events = {e, moved(3, 4, {1, 0, 0})};
+    const auto at = [&](double t) { return scene::placed(scene::pose_at(s, 1, 2, t), {}); };
+    for (const auto& [t, x] : {std::pair{0.5, Vector{}},
+                               {1.25, Vector{0.5, 0, 0}},
+                               {2.0, Vector{1, -0.5, 1}},
+                               {2.5, Vector{1, -1, 2}},
+                               {2.9, Vector{1, -1, 2}},
+                               {3.5, Vector{1.5, -1, 2}}})
+        EXPECT_LT(length(at(t) - x), 1e-12) << t;
+    EXPECT_NEAR(scene::fastest_wall(s), std::sqrt(5.0), 1e-9);
+    EXPECT_EQ(scene::end_of(e), 2.5);
+    EXPECT_FALSE(scene::has_course(e)); // the wall alone
+}
+
 TEST(Motion, AWallTurnedIsTheWallDrawnTurned)
 {
     for (const int dimensions : {2, 3}) {

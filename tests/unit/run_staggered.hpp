@@ -5,6 +5,7 @@
 // - as it is: sigma, rho, plastic strain, energies, viscous acceleration;
 // - with soil so strong that it stays elastic, without stress: sigma' = R l R^T + l, l = dt/2 C : D, solved for l by repeated insertion;
 // - so strong, with +-S0 of distinct principal stresses: half the difference is R S0 R^T, and its spin w follows as in run_pass.hpp.
+#include "solver/run/loads.hpp"
 #include "solver/scene/events.hpp"
 #include "solver/scene/motion.hpp"
 #include "tests/unit/run_pass.hpp"
@@ -85,7 +86,8 @@ public:
     std::vector<Worked> run(int stage, double dt, double next, double energy_unit)
     {
         StepInput in = cloud_.input(dt);
-        in.next = next, in.energy_unit = energy_unit, in.forces.damping = damping_;
+        const auto loads = loads_now(cloud_.scene);
+        in.next = next, in.energy_unit = energy_unit, in.forces.damping = damping_, in.loads = loads;
         std::vector<Worked> worked;
         for (Index c = 0; c < cloud_.lists.size(); ++c)
             worked.push_back({cloud_.lists.first(c), cloud_.lists.count(c), model_->run(stage, in, std::array{c})});

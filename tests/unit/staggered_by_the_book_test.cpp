@@ -54,9 +54,11 @@ void repeat_walls(Cloud& c)
 /// Columns that a cloud has not, from the particles' ids.
 struct State {
     double rate, slip, pressure;      // Pa/s, m, m/s^2
+    double push;                      // N, of a load; 0: no loads
     std::vector<std::uint8_t> walled; // by id: slip and pressure are kept of particles at walls alone
     void operator()(Particles& p) const
     {
+        if (push != 0) p.require(field::load, field::load_push);
         for (Index i = 0; i < p.size(); ++i) {
             std::mt19937_64 g(std::uint64_t(p[field::id][i]) + 17);
             const auto u = [&] { return std::uniform_real_distribution<double>(-1, 1)(g); };
@@ -73,6 +75,8 @@ struct State {
                 p[field::wall_friction].set(i, most);
             }
             if (p.has(field::opened_volume)) p[field::opened_volume].set(i, i % 4 ? 0 : 1e-5 * std::fabs(u()));
+            if (push == 0) continue;
+            p[field::load].set(i, std::int32_t(p[field::id][i] % 3)), p[field::load_push].set(i, push * Vector{u(), u(), u()});
         }
     }
 };
@@ -96,13 +100,21 @@ Steps steps(const Cloud& c)
     const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest, 2 / sound_of(c));
     return {dt, 0.7 * dt};
 }
+/// As much as the stress of the cloud pushes one particle.
+double push_of(const Cloud& c)
+{
+    double stress = 0;
+    for (Index i = 0; i < c.particles.size(); ++i) stress = std::max(stress, std::fabs(trace(c.particles[field::stress][i])));
+    return stress * c.scene.particle_volume() / c.scene.smoothing_length();
+}
 State state_of(const Cloud& c)
 {
     const auto& p = c.particles;
     const double support2 = c.scene.support() * c.scene.support();
     // A model may hold more terms than its scene asks for: without diffusion there is no rate of it.
     State state{c.scene.effects.stress_diffusion ? 1e3 / steps(c).dt : 0, 1e-5 * c.scene.space.spacing,
-                0.1 * sound_of(c) * sound_of(c) / c.scene.smoothing_length(), std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
+                0.1 * sound_of(c) * sound_of(c) / c.scene.smoothing_length(), c.scene.loads.empty() ? 0 : push_of(c),
+                std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
     for (Index i = 0; i < p.size(); ++i)
         for (const auto& w : c.walls)
             for (std::size_t k = 0; k < w.x.size(); ++k) {
@@ -139,6 +151,11 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
                      p[field::plastic_strain][i],
                      p[field::opened_volume][i]};
         if (coulomb) k.slip = p[field::wall_slip][i], k.pressed = p[field::wall_pressure][i], k.friction = p[field::wall_friction][i];
+        if (const int l = s.loads.empty() ? -1 : p[field::load][i] - 1; l >= 0) {
+            const scene::Load& load = s.loads[std::size_t(l)];
+            if (load.follow) k.pressure = unit_pressure(s) * load.factor * *load.pressure;
+            else k.push = load.factor * p[field::load_push][i];
+        }
         kept.push_back(k);
     }
     const auto places = places_of(s);
@@ -182,14 +199,14 @@ double norm(const Stress& s) { return std::sqrt(contract(s, s)); }
 struct Difference {
     double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0;                       // strain
     double acceleration = 0, velocity = 0, rate = 0, slip = 0, pressure = 0, friction = 0; // force
-    double strain_energy[3] = {}, moved[4] = {}, before[5] = {}, later[5] = {};            // energies; moved: by viscosity at moving walls
+    double strain_energy[3] = {}, moved[4] = {}, before[6] = {}, later[6] = {};            // energies; moved: by viscosity at moving walls
     std::int64_t pairs = 0;
     double largest() const
     {
         double most = std::max({L, stress, density, plastic, viscous, acceleration, velocity, pressure, friction}); // but for rate and slip
         for (const auto e : strain_energy) most = std::max(most, e);
         for (const auto e : moved) most = std::max(most, e);
-        for (int k = 0; k < 5; ++k) most = std::max({most, before[k], later[k]});
+        for (int k = 0; k < 6; ++k) most = std::max({most, before[k], later[k]});
         return most;
     }
 };
@@ -202,7 +219,7 @@ std::ostream& operator<<(std::ostream& to, const Difference& d)
     to << " of moving walls";
     for (const auto e : d.moved) to << " " << e;
     to << " of force";
-    for (int k = 0; k < 5; ++k) to << " " << d.before[k] << " " << d.later[k];
+    for (int k = 0; k < 6; ++k) to << " " << d.before[k] << " " << d.later[k];
     return to;
 }
 struct Passed {
@@ -217,7 +234,8 @@ Passed passed(const Cloud& c, Arithmetic arithmetic, const Read& read)
     for (std::size_t i = 0; i < read.strained.size(); ++i) {
         const auto& s = read.strained[i];
         const auto &b = read.forced[i].before, &a = read.forced[i].coming;
-        for (const double e : {s.plastic, s.stabilising, s.wall, b.viscous, b.stabilising, b.wall, b.damping, a.viscous, a.wall, a.damping})
+        for (const double e : {s.plastic, s.stabilising, s.wall, b.viscous, b.stabilising, b.wall, b.damping, a.viscous, a.wall, a.damping,
+                               b.loads, a.loads})
             most = std::max(most, std::fabs(e));
     }
     const double unit = std::max(most, 1e-30) * 0x1p-44;
@@ -280,18 +298,19 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         note(d.moved[3], std::fabs(g.result.later.moved_wall + coming), g.count * of_energy);
     }
     for (const auto& g : pass.force.worked) {
-        double before[5] = {}, later[5] = {};
+        double before[6] = {}, later[6] = {};
         std::int64_t pairs = 0;
         for (Index i = g.first; i < g.first + g.count; ++i) {
             const auto add = [](double* to, const book::Taken& t) {
                 to[0] += t.viscous, to[1] += t.stabilising, to[2] += t.wall, to[3] += t.damping, to[4] += t.moved_wall;
+                to[5] += t.loads;
             };
             add(before, read.forced[i].before), add(later, read.forced[i].coming);
             pairs += read.forced[i].pairs;
         }
         const auto compare = [&](double* worst, const EnergySums& e, const double* sums) {
-            const double is[5] = {e.viscous, e.stabilising, e.wall, e.damping, e.moved_wall};
-            for (int k = 0; k < 5; ++k) note(worst[k], std::fabs(is[k] - sums[k]), g.count * of_energy);
+            const double is[6] = {e.viscous, e.stabilising, e.wall, e.damping, e.moved_wall, e.loads};
+            for (int k = 0; k < 6; ++k) note(worst[k], std::fabs(is[k] - sums[k]), g.count * of_energy);
         };
         compare(d.before, g.result.energy, before), compare(d.later, g.result.later, later);
         d.pairs = std::max(d.pairs, std::abs(g.result.pairs - pairs));
@@ -446,6 +465,39 @@ TEST(StaggeredByTheBook, WallsThatMove)
             s.walls[0].surface = scene::Surface(surface);
             hold(moved(s, {0.5, -1}), std::string(surfaces[surface]) + " corner whose walls part");
         }
+}
+
+TEST(StaggeredByTheBook, Loads)
+{
+    // the first follows its faces, the second does not; every third particle has none
+    const auto loaded = [](Scene s) {
+        s.loads = {{.pressure = 2e3, .follow = true, .factor = 1.5}, {.pressure = 1.0, .factor = 0.7}};
+        return s;
+    };
+    int arrangement = 0;
+    for (const Scene& bare : scenes(staggered)) {
+        const auto hold = [&](const Scene& s, const std::string& what) {
+            const auto arranged = Arrangement(1 + arrangement++ % 5);
+            const Cloud c = walled_cloud(arranged, loaded(s));
+            const Read read = by_the_book(c);
+            const auto given = [](const book::Forced& i) { return i.before.loads != 0 && i.coming.loads != 0; };
+            EXPECT_GT(std::ranges::count_if(read.forced, given), c.particles.size() / 2) << what;
+            expect_by_the_book(c, read, what + ", " + arrangements[arranged]);
+            Scene mistaken = c.scene;
+            mistaken.loads[arrangement % 2].factor *= 1.01;
+            const auto off = difference(c, passed(c, Arithmetic::Simd, read), by_the_book(c, &mistaken));
+            EXPECT_GT(off.largest(), 10 * sharp) << what; // the control
+        };
+        hold(bare, "loads far from walls");
+        for (int surface = 0; surface < 3; ++surface) {
+            Scene s = bare;
+            s.walls = {wall(3, surface, s.dimensions)};
+            hold(s, std::string("loads at a wall, ") + surfaces[surface]);
+            s.walls = corner(s.dimensions);
+            s.walls[0].surface = scene::Surface(surface);
+            hold(s, std::string("loads in a corner, ") + surfaces[surface]);
+        }
+    }
 }
 
 TEST(StaggeredByTheBook, PoreWaterAndNoGravity)

@@ -6,7 +6,7 @@
 namespace kuzure {
 
 namespace {
-constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising", "moved_wall"};
+constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising", "moved_wall", "loads"};
 static_assert(dissipated_names.size() == std::tuple_size_v<decltype(DissipatedUnits::members)>);
 } // namespace
 

@@ -10,6 +10,7 @@
 #include "solver/core/ensure.hpp"
 #include "solver/core/simd.hpp"
 #include "solver/core/wall_clock.hpp"
+#include "solver/run/loads.hpp"
 #include "solver/scene/motion.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -40,6 +41,29 @@ void Ending::draw_pictures(Simulation& sim)
     });
 }
 
+namespace {
+std::vector<std::pair<std::string, double>> energies(const Ledger& l, double residual)
+{
+    return {{"kinetic", l.state.kinetic},
+            {"potential", l.state.potential},
+            {"elastic", l.state.elastic},
+            {"plastic", l.dissipated.plastic},
+            {"viscous", l.dissipated.viscous},
+            {"wall", l.dissipated.wall},
+            {"damping", l.dissipated.damping},
+            {"stabilising", l.dissipated.stabilising},
+            {"moved_wall", l.dissipated.moved_wall},
+            {"events", l.events},
+            {"loads", l.dissipated.loads},
+            {"residual", residual}};
+}
+nlohmann::json told(const LoadedSoil& load)
+{
+    const Vector f = load.force;
+    return {{"name", load.name}, {"particles", load.particles}, {"force", {f.x, f.y, f.z}}, {"factor", load.factor}};
+}
+} // namespace
+
 void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::string& status, Exit code, const std::string& message)
 {
     const Ledger l = sim.ledger();
@@ -57,17 +81,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     s.seconds_per_step = steps_here > 0 ? stepping / double(steps_here) : 0;
     const std::int64_t particle_steps = comm_.sum(sim.work_done().particle_steps);
     s.particle_steps_per_second = stepping > 0 ? double(particle_steps) / stepping : 0;
-    s.energy = {{"kinetic", l.state.kinetic},
-                {"potential", l.state.potential},
-                {"elastic", l.state.elastic},
-                {"plastic", l.dissipated.plastic},
-                {"viscous", l.dissipated.viscous},
-                {"wall", l.dissipated.wall},
-                {"damping", l.dissipated.damping},
-                {"stabilising", l.dissipated.stabilising},
-                {"moved_wall", l.dissipated.moved_wall},
-                {"events", l.events},
-                {"residual", sim.residual(l)}};
+    s.energy = energies(l, sim.residual(l));
     s.effects = scene_.notes;
     s.state_hash = state_hash(comm_, sim.particles());
     s.message = message;
@@ -90,6 +104,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
         j["settling"] = {{"why", settled->why},        {"steps", settled->steps},        {"seconds", settled->time},
                          {"speed", settled->speed},    {"moved", settled->displacement}, {"held", settled->held},
                          {"at_rest", settled->at_rest}};
+    for (const auto& load : loaded_soil(comm_, sim.scene(), sim.particles())) j["loads"].emplace_back(told(load));
     if (volume > 0) j["resting_volume_ratio"] = volume;
     if (outputs.fronts()) j["soil_off_ground"] = outputs.fronts()->off_ground;
     if (outputs.maps() && !outputs.maps()->summary().is_null()) j["maps"] = outputs.maps()->summary();

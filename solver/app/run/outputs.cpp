@@ -177,7 +177,8 @@ void Outputs::write_history(Simulation& sim)
                       fronts.max_y,
                       l.dissipated.stabilising,
                       l.dissipated.moved_wall,
-                      l.events});
+                      l.events,
+                      l.dissipated.loads});
 }
 
 void Outputs::write_forces(Simulation& sim)

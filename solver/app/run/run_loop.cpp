@@ -9,6 +9,7 @@
 #include "solver/app/run/twin_runs.hpp"
 #include "solver/app/scaling/estimate.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/run/loads.hpp"
 #include "solver/scene/check.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -165,6 +166,10 @@ private:
             messages_.say(words_of(*s));
             if (!s->at_rest) messages_.warn(words_of(*s));
         }
+        for (const auto& l : loaded_soil(comm_, sim_->scene(), sim_->particles()))
+            if (l.particles > 0)
+                messages_.say(fmt::format("load {} pushes {} particles, all of it by [{:.6g} {:.6g} {:.6g}] N{}", l.name, l.particles,
+                                          l.force.x, l.force.y, l.force.z, scene_.dimensions == 2 ? " a metre" : ""));
     }
     static std::string words_of(const Settling& s)
     {

@@ -22,6 +22,10 @@ std::string first_fault(const Particles& p, const Scene& scene, std::int64_t cou
         for (Index i = 0; i < p.size(); ++i)
             if (const auto a = p[field::activity][i]; a < std::int32_t(Activity::Moves) || a > std::int32_t(Activity::Asleep))
                 return fmt::format("particle {} has activity {}, expected 0 to 2", id[i], a);
+    if (p.has(field::load))
+        for (Index i = 0; i < p.size(); ++i)
+            if (const auto l = p[field::load][i]; l < 0 || std::size_t(l) > scene.loads.size())
+                return fmt::format("particle {} is pushed by load {}, the scene has {} loads", id[i], l, scene.loads.size());
     std::string fault;
     p.for_each_present([&](auto f) {
         if constexpr (std::is_same_v<typename decltype(f)::Number, double>) {

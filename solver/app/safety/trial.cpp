@@ -52,6 +52,7 @@ Scene scene_at(const Scene& scene, double time, const io::Path& state)
     Scene s = scene::stage_of(scene, int(begun), time);
     s.events.clear();
     std::erase_if(s.walls, [](const scene::Wall& w) { return !w.present; });
+    std::erase_if(s.loads, [](const scene::Load& l) { return !l.present; });
     for (const auto& w : s.walls)
         if (w.pose != scene::Pose{})
             throw BadInput(fmt::format("--at {:g}: wall {} has been moved by then, and a trial's walls stand as they are drawn. Remedy: an "

@@ -46,7 +46,7 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     const double points = std::round(s.dimensions == 3 ? std::cbrt(wanted) : std::sqrt(wanted)), edge = points * s.space.spacing;
     const double shake = 0.2 * s.space.spacing;
     s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
-    s.walls.clear(), s.events.clear(), s.probes.clear();
+    s.walls.clear(), s.loads.clear(), s.events.clear(), s.probes.clear();
     s.bodies.resize(1);
     s.bodies[0] = {.soil = s.bodies[0].soil, .shape = scene::Box{{0, 0, 0}, {edge, edge, edge}}};
     const double step = 1e-3 * scene::crossing_time(s);

@@ -1,14 +1,14 @@
-#include "io/ground_motion.hpp"
+#include "io/time_record.hpp"
 #include "io/csv.hpp"
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 namespace kuzure::io {
 
-std::vector<std::array<double, 4>> read_ground_motion(const Path& path)
+std::vector<std::array<double, 4>> read_time_record(const Path& path, const RecordOf& record)
 {
-    const Csv csv =
-        read_csv(path, "a .csv of ground motion with the columns time, x, y, z; the path counts from the scene file's directory");
+    const Csv csv = read_csv(
+        path, fmt::format("a .csv of {} with the columns time, x, y, z; the path counts from the scene file's directory", record.what));
     const auto columns = [&] { return csv.header.empty() ? std::string("nothing") : fmt::format("{}", fmt::join(csv.header, ", ")); };
     const char* names[] = {"time", "x", "y", "z"};
     std::array<std::optional<std::size_t>, 4> at;
@@ -25,7 +25,7 @@ std::vector<std::array<double, 4>> read_ground_motion(const Path& path)
             const auto x = csv_number(cells[*at[c]]);
             if (!x)
                 csv.refuse(line, fmt::format("expected a number in {} for {}, found \"{}\"; write it with a point, without a unit",
-                                             c == 0 ? "s" : "m/s^2", names[c], cells[*at[c]]));
+                                             c == 0 ? "s" : record.unit, names[c], cells[*at[c]]));
             row[c] = *x;
         }
         if (rows.size() == 1 ? row[0] < 0 : !(row[0] > rows[rows.size() - 2][0]))

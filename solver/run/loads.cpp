@@ -1,0 +1,224 @@
+#include "solver/run/loads.hpp"
+#include "solver/core/ensure.hpp"
+#include "solver/physics/smoothing.hpp"
+#include "solver/run/exact_sums.hpp"
+#include "solver/scene/events.hpp"
+#include "solver/scene/loads.hpp"
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace kuzure {
+
+double unit_pressure(const Scene& scene)
+{
+    const int d = scene.dimensions, reach = int(2 * scene.space.h) + 1;
+    const double h = scene.space.h; // lengths in spacings
+    const auto moment = [&](const auto& kernel) {
+        double sum = 0;
+        for (int x = -reach; x <= reach; ++x)
+            for (int y = -reach; y <= reach; ++y)
+                for (int z = d == 3 ? -reach : 0; z <= (d == 3 ? reach : 0); ++z) {
+                    const double r = std::sqrt(double(x * x + y * y + z * z));
+                    if (r > 0) sum -= kernel.scale * kernel.F(std::max(2 * h - r, 0.0), r, 1 / r) * x * x;
+                }
+        return sum;
+    };
+    switch (scene.accuracy.kernel) {
+    case scene::Kernel::CubicSpline:
+        return 1 / moment(CubicSpline(h, d));
+    case scene::Kernel::WendlandC2:
+        return 1 / moment(WendlandC2(h, d));
+    case scene::Kernel::WendlandC4:
+        break;
+    }
+    return 1 / moment(WendlandC4(h, d));
+}
+
+std::vector<LoadNow> loads_now(const Scene& scene)
+{
+    std::vector<LoadNow> now;
+    const double unit = scene.loads.empty() ? 1 : unit_pressure(scene);
+    for (const auto& l : scene.loads) {
+        const double factor = l.present ? l.factor : 0;
+        now.push_back(l.follow ? LoadNow{unit * factor * l.pressure.value_or(0), 0} : LoadNow{0, factor});
+    }
+    return now;
+}
+
+std::vector<int> loads_come(const Scene& before, const Scene& after)
+{
+    std::vector<int> loads;
+    for (std::size_t l = 0; l < after.loads.size(); ++l)
+        if (after.loads[l].present && !before.loads[l].present) loads.push_back(int(l));
+    return loads;
+}
+
+void give_to_loads(const Team& team, const Scene& scene, const scene::Filling& filling, std::span<const int> loads, double time,
+                   bool settles, Particles& p)
+{
+    const auto number = p[field::load];
+    const auto push = p[field::load_push];
+    for (const int l : loads) {
+        std::int64_t found = 0, taken = std::numeric_limits<std::int64_t>::max(), other = -1;
+        for (Index i = 0; i < p.size(); ++i) {
+            const std::int64_t id = std::as_const(p)[field::id][i];
+            const Vector x = std::as_const(p)[field::position][i];
+            if (!scene::pushes(scene, scene.loads[std::size_t(l)], filling.body_of(id), x)) continue;
+            ++found;
+            if (number[i] != 0 && id < taken) taken = id, other = number[i] - 1;
+            number.set(i, std::int32_t(l + 1)), push.set(i, Vector{});
+        }
+        std::int64_t first = taken;
+        team.min(std::span(&first, 1));
+        const std::int64_t pushes = team.max(taken == first ? other : -1);
+        if (pushes >= 0)
+            throw NumbersFailed(fmt::format("{} begins at t = {:.6g} s on soil that {} pushes already: particle {}. Remedy: boxes that do "
+                                            "not overlap, or remove the other load first",
+                                            scene::name_of_load(scene, l), time, scene::name_of_load(scene, int(pushes)), first));
+        if (!settles && team.sum(found) == 0)
+            throw NumbersFailed(
+                fmt::format("{} begins at t = {:.6g} s where no soil is. Remedy: a box that holds the face and the two layers "
+                            "of soil below it as they are then",
+                            scene::name_of_load(scene, l), time));
+    }
+}
+
+void take_from_loads(std::span<const int> loads, Particles& p)
+{
+    if (loads.empty()) return;
+    const auto number = p[field::load];
+    for (Index i = 0; i < p.size(); ++i)
+        if (std::ranges::count(loads, number[i] - 1) > 0) number.set(i, 0), p[field::load_push].set(i, Vector{});
+}
+
+namespace {
+
+/// Where one load's soil is seen along a normal: a particle covers a square of a spacing, and each of the samples, two a spacing, belongs
+/// to the soil that is seen there and what lies less than a support behind it.
+class SeenAlong {
+public:
+    SeenAlong(const Team& team, const Scene& scene, std::int32_t number, Vector normal, const Particles& p)
+        : team_(team), number_(number), dimensions_(scene.dimensions), spacing_(scene.space.spacing), support_(scene.support()),
+          n_((1 / length(normal)) * normal), p_(p)
+    {
+        // In 2-D the first tangent lies in the plane, and all of y is one sample.
+        const Vector other = dimensions_ == 2 || std::fabs(n_.y) < 0.9 ? Vector{0, 1, 0} : Vector{1, 0, 0};
+        const Vector t = cross(other, n_);
+        a_ = (1 / length(t)) * t, b_ = cross(n_, a_);
+        std::array<double, 2> low{infinite, infinite}, high{-infinite, -infinite};
+        for_each([&](Index i, Vector) {
+            const double at[2] = {along_a(i), along_b(i)};
+            for (std::size_t k = 0; k < 2; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
+        });
+        team_.min(std::span<double>(low)), team_.max(std::span<double>(high));
+        // Between samples, so that rounding decides nothing on a lattice.
+        low_ = {low[0] - 0.25 * spacing_, low[1] - 0.25 * spacing_};
+        for (std::size_t k = 0; k < 2; ++k) count_[k] = low[k] > high[k] ? 0 : std::size_t((high[k] - low_[k]) / sample() + 1) + 1;
+        if (dimensions_ == 2) count_[1] = std::min<std::size_t>(count_[1], 1);
+    }
+    /// Calls give(particle, area in m^2) for this rank's soil. Collective.
+    template <class Give> void share(Give give)
+    {
+        std::vector<double> top(count_[0] * count_[1], -infinite);
+        for_each([&](Index i, Vector x) { for_each_sample(i, [&](std::size_t k) { top[k] = std::max(top[k], dot(x, n_)); }); });
+        team_.max(std::span<double>(top));
+        // Weights in whole units, so that their sums are the same in any order.
+        std::vector<std::int64_t> weights(top.size(), 0);
+        const auto weight = [&](Index i) {
+            const double area = std::max(0.0, -dot(p_[field::load_push][i], n_));
+            return std::int64_t(std::nearbyint(std::ldexp(area / area_of_particle(), 30))) + 1; // one at least: some soil is seen there
+        };
+        const auto near = [&](Vector x, std::size_t k) { return dot(x, n_) >= top[k] - support_; };
+        for_each([&](Index i, Vector x) { for_each_sample(i, [&](std::size_t k) { weights[k] += near(x, k) ? weight(i) : 0; }); });
+        team_.sum(std::span<std::int64_t>(weights));
+        const double area = area_of_particle() / (dimensions_ == 3 ? 4 : 2);
+        for_each([&](Index i, Vector x) {
+            double mine = 0;
+            for_each_sample(i, [&](std::size_t k) { mine += near(x, k) ? double(weight(i)) / double(weights[k]) : 0; });
+            give(i, area * mine);
+        });
+    }
+
+private:
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+    double sample() const { return 0.5 * spacing_; }
+    double area_of_particle() const { return dimensions_ == 3 ? spacing_ * spacing_ : spacing_; }
+    double along_a(Index i) const { return dot(p_[field::position][i], a_); }
+    double along_b(Index i) const { return dimensions_ == 3 ? dot(p_[field::position][i], b_) : 0; }
+    template <class Visit> void for_each(Visit visit) const
+    {
+        for (Index i = 0; i < p_.size(); ++i)
+            if (p_[field::load][i] == number_) visit(i, p_[field::position][i]);
+    }
+    /// The samples that a particle covers: centres from half a spacing before it to half a spacing after it.
+    template <class Visit> void for_each_sample(Index i, Visit visit) const
+    {
+        const double at[2] = {along_a(i), along_b(i)};
+        std::array<std::size_t, 2> first{}, last{};
+        for (std::size_t k = 0; k < 2; ++k) {
+            const double from = (at[k] - 0.5 * spacing_ - low_[k]) / sample(), to = (at[k] + 0.5 * spacing_ - low_[k]) / sample();
+            first[k] = std::size_t(std::max(0.0, std::ceil(from)));
+            last[k] = std::size_t(std::clamp(std::ceil(to), 0.0, double(count_[k])));
+        }
+        if (dimensions_ == 2) first[1] = 0, last[1] = 1;
+        for (std::size_t b = first[1]; b < last[1]; ++b)
+            for (std::size_t a = first[0]; a < last[0]; ++a) visit(b * count_[0] + a);
+    }
+
+    const Team& team_;
+    std::int32_t number_;
+    int dimensions_;
+    double spacing_, support_;
+    Vector n_, a_, b_;
+    std::array<double, 2> low_{};
+    std::array<std::size_t, 2> count_{};
+    const Particles& p_;
+};
+
+} // namespace
+
+void set_pushes(const Team& team, const Scene& scene, std::span<const int> loads, Particles& p)
+{
+    const auto push = p[field::load_push];
+    for (const int number : loads) {
+        const scene::Load& l = scene.loads[std::size_t(number)];
+        if (!l.normal) {
+            for (Index i = 0; i < p.size(); ++i)
+                if (std::as_const(p)[field::load][i] == number + 1) push.set(i, l.pressure.value_or(0) * push[i]);
+            continue;
+        }
+        const Vector n = (1 / length(*l.normal)) * *l.normal;
+        std::vector<std::pair<Index, double>> areas;
+        SeenAlong(team, scene, number + 1, n, std::as_const(p)).share([&](Index i, double area) { areas.emplace_back(i, area); });
+        for (const auto& [i, area] : areas) push.set(i, area * (l.traction ? *l.traction : -l.pressure.value_or(0) * n));
+    }
+}
+
+std::vector<LoadedSoil> loaded_soil(const Team& team, const Scene& scene, const Particles& p)
+{
+    const std::size_t n = scene.loads.size();
+    std::vector<LoadedSoil> all;
+    if (n == 0) return all;
+    const auto sums = exact_sums(team, 4 * n, [&](auto add) {
+        for (Index i = 0; i < p.size(); ++i) {
+            const std::int32_t number = p[field::load][i];
+            if (number == 0) continue;
+            const std::size_t at = 4 * (std::size_t(number) - 1);
+            const Vector force = p[field::load_push][i];
+            add(at, 1), add(at + 1, force.x), add(at + 2, force.y), add(at + 3, force.z);
+        }
+    });
+    for (std::size_t l = 0; l < n; ++l) {
+        const scene::Load& load = scene.loads[l];
+        all.push_back({load.name.empty() ? std::to_string(l) : load.name,
+                       std::int64_t(sums[4 * l]),
+                       {sums[4 * l + 1], sums[4 * l + 2], sums[4 * l + 3]},
+                       load.present ? load.factor : 0});
+    }
+    return all;
+}
+
+} // namespace kuzure
