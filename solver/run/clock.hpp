@@ -2,6 +2,7 @@
 // Where a run stands in time, and how long its next step is. Decided from numbers that all ranks share.
 #include "solver/pairs/tally.hpp"
 #include "solver/run/energy.hpp"
+#include "solver/run/exact_sums.hpp"
 #include "solver/scene/events.hpp"
 #include <vector>
 
@@ -31,7 +32,7 @@ struct Clock {
     int events = 0;             // that have begun, in their order (scene::order_of_events)
     std::int64_t taken = 0;     // energy units that events have taken out of the ledger; the same on every rank
     // Impulse on each named wall, in units of an impulse (WallForces); over ranks, kept by rank 0.
-    std::vector<std::array<std::int64_t, 3>> impulse;
+    std::vector<std::array<WideUnits, 3>> impulse;
 };
 
 /// Length of a step that starts at clock.time, s, 0 when the end time is reached:

@@ -1,11 +1,36 @@
 #pragma once
 // Sums over particles and ranks of numbers of any size, the same bits in whatever order they are added.
 #include "solver/core/team.hpp"
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
 namespace kuzure {
+
+/// A whole number of units that no run can outgrow, high 2^40 + low; the same value however it was added up.
+struct WideUnits {
+    std::int64_t high = 0, low = 0; // 0 <= low < 2^40 after add()
+    /// |units| < 2^62.
+    void add(std::int64_t units) { *this = sum(high, low + units); }
+    double value() const { return std::ldexp(double(high), 40) + double(low); }
+    static WideUnits sum(std::int64_t high, std::int64_t low)
+    {
+        const std::int64_t carry = low >> 40; // rounds down
+        return {high + carry, low - carry * (std::int64_t(1) << 40)};
+    }
+};
+/// Collective: over all ranks.
+inline void add_over_ranks(const Team& team, std::vector<std::array<WideUnits, 3>>& all)
+{
+    std::vector<std::int64_t> parts;
+    for (const auto& vector : all)
+        for (const auto& u : vector) parts.insert(parts.end(), {u.high, u.low});
+    team.sum(std::span<std::int64_t>(parts));
+    auto part = parts.begin();
+    for (auto& vector : all)
+        for (auto& u : vector) u = WideUnits::sum(part[0], part[1]), part += 2;
+}
 
 /// Collective: n sums. visit(add) is called twice and each time calls add(k, x) for every addend x of sum k on this rank, of which there
 /// are fewer than 2^32 over all ranks. Of each x its first 60 bits below the largest addend count. What is not finite is left out.

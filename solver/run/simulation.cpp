@@ -382,7 +382,7 @@ Clock Simulation::clock() const
     c.dissipated = over_ranks(comm_, c.dissipated), c.later = over_ranks(comm_, c.later);
     if (wall_forces_.any()) {
         c.impulse.resize(WallForces::named(scene_).size());
-        comm_.sum(std::span<std::int64_t>(c.impulse.front().data(), 3 * c.impulse.size()));
+        add_over_ranks(comm_, c.impulse);
     }
     return c;
 }

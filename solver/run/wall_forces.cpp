@@ -147,7 +147,7 @@ void WallForces::renew_faces()
 double WallForces::impulse_unit(const Clock& clock) const
 {
     // Of weight times height in whole energy units there are 2^46; of the weight during one crossing of the smoothing length 2^46 times
-    // spacings over height, so that millions of steps fit into 63 bits.
+    // spacings over height.
     return std::exp2(std::floor(std::log2(clock.energy_unit / scene_.space.spacing * scene::crossing_time(scene_))));
 }
 
@@ -161,20 +161,22 @@ bool WallForces::add_impulse(const Particles& p, double seconds, Clock& clock)
     bool outgrown = false;
 #pragma omp parallel
     {
-        std::vector<std::array<std::int64_t, 3>> mine(walls_.size());
+        std::vector<std::array<WideUnits, 3>> mine(walls_.size());
         bool too_large = false;
 #pragma omp for schedule(static) nowait
         for (Index c = 0; c < clusters; ++c)
             for_each_force(p, c, [&](std::size_t k, Vector, Vector force) {
                 const double units[3] = {per_unit * force.x, per_unit * force.y, per_unit * force.z};
                 for (std::size_t a = 0; a < 3; ++a)
-                    if (std::fabs(units[a]) < 0x1p50) mine[k][a] += std::int64_t(std::nearbyint(units[a]));
+                    if (std::fabs(units[a]) < 0x1p50) mine[k][a].add(std::int64_t(std::nearbyint(units[a])));
                     else too_large = true;
             });
 #pragma omp critical
         {
             for (std::size_t k = 0; k < mine.size(); ++k)
-                for (std::size_t a = 0; a < 3; ++a) clock.impulse[k][a] += mine[k][a];
+                for (std::size_t a = 0; a < 3; ++a)
+                    clock.impulse[k][a] =
+                        WideUnits::sum(clock.impulse[k][a].high + mine[k][a].high, clock.impulse[k][a].low + mine[k][a].low);
             outgrown = outgrown || too_large;
         }
     }
@@ -188,7 +190,7 @@ std::vector<WallLoad> WallForces::loads(const Team& team, const Particles& p, co
     place_walls();
     auto impulse = clock.impulse;
     impulse.resize(walls_.size());
-    team.sum(std::span<std::int64_t>(impulse.front().data(), 3 * impulse.size()));
+    add_over_ranks(team, impulse);
     const auto sums = exact_sums(team, 6 * walls_.size(), [&](auto add) {
         for (Index c = 0; c < layout_.lists().size(); ++c)
             for_each_force(p, c, [&](std::size_t k, Vector x, Vector f) {
@@ -204,7 +206,7 @@ std::vector<WallLoad> WallForces::loads(const Team& team, const Particles& p, co
         all.push_back({scene_.walls[std::size_t(walls_[k])].name,
                        {s[0], s[1], s[2]},
                        {s[3], s[4], s[5]},
-                       {unit * double(j[0]), unit * double(j[1]), unit * double(j[2])}});
+                       {unit * j[0].value(), unit * j[1].value(), unit * j[2].value()}});
     }
     return all;
 }

@@ -5,6 +5,9 @@
 
 namespace kuzure {
 
+static void to_json(nlohmann::ordered_json& j, const WideUnits& u) { j = {u.high, u.low}; }
+static void from_json(const nlohmann::json& j, WideUnits& u) { j.at(0).get_to(u.high), j.at(1).get_to(u.low); }
+
 namespace {
 constexpr std::array dissipated_names{"plastic", "viscous", "wall", "damping", "stabilising", "moved_wall", "loads"};
 static_assert(dissipated_names.size() == std::tuple_size_v<decltype(DissipatedUnits::members)>);
