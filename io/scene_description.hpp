@@ -156,7 +156,8 @@ inline Words<scene::Cone> cone_words()
 /// Of a body or wall.
 inline KeyInfo name_info(const char* example)
 {
-    return {.optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall, body or load has it"};
+    return {
+        .optional = true, .example = example, .doc = "its name in events, forces, probes and messages; no other wall, body or load has it"};
 }
 
 /// What changes a soil's strength as it yields.
@@ -450,6 +451,10 @@ template <class A> void describe_load(A& a, const std::string& path, scene::Load
            {.fallback = "false",
             .example = "true",
             .doc = "the pressure acts on the faces as they are at each time; without it each particle keeps the force of the start"});
+    a.flag(path + ".plate", l.plate,
+           {.fallback = "false",
+            .example = "true",
+            .doc = "the soil at the face moves along normal as one, as if a weightless plate lay on it that does not tilt"});
     a.number(path + ".factor", l.factor,
              {.unit = "1", .range = from(0), .fallback = "1.0", .example = "0.0", .doc = "how much of it acts before an event changes it"});
 }

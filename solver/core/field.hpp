@@ -58,6 +58,9 @@ inline constexpr struct Load : Field<"load", "1", Shape::Scalar, std::int32_t> {
 } load;
 inline constexpr struct LoadPush : Field<"load_push", "N", Shape::Vector> {
 } load_push;
+// Only where a load has a plate: acceleration by all forces whose work no energy stores (viscous, artificial, of walls and loads).
+inline constexpr struct Unstored : Field<"unstored", "m/s^2", Shape::Vector> {
+} unstored;
 // State half a step earlier: what Bui's leap-frog advances.
 inline constexpr struct HalfVelocity : Field<"half_step_velocity", "m/s", Shape::Vector> {
 } half_velocity;
@@ -84,7 +87,7 @@ enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
 using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
                              field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction,
-                             field::WallForce, field::Load, field::LoadPush, field::HalfVelocity, field::HalfDensity, field::HalfStress,
-                             field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+                             field::WallForce, field::Load, field::LoadPush, field::Unstored, field::HalfVelocity, field::HalfDensity,
+                             field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -236,6 +236,7 @@ private:
         if (!in.loads.empty()) {
             by_loads = load_acceleration(in, U(2.0) * per_rho * sums.grad_one, loaded, lanes, soil.rho0, rho);
             body = body + by_loads;
+            if (p.has(field::unstored)) p[field::unstored].store(lanes.at, (viscous + artificial) + (wall + by_loads), lanes.n);
         }
         Vec3<U> a = ((stress + viscous) + (artificial + wall)) + body;
         // Damping over the whole kick, unconditionally stable: v+ = ((1 - mu k/2) v- + k a)/(1 + mu k/2)

@@ -91,7 +91,7 @@ public:
         for (std::size_t w = 0; w < points.size(); ++w) {
             auto& to = walls_[w];
             const std::size_t n = points[w].x.size();
-            to.wall = &scene.walls[points[w].wall];
+            to.wall = scene.walls[points[w].wall];
             to.x.resize(n), to.y.resize(n), to.z.resize(n);
             for (std::size_t k = 0; k < n; ++k)
                 to.x[k] = fixed_(points[w].x[k]), to.y[k] = fixed_(points[w].y[k]), to.z[k] = fixed_(points[w].z[k]);
@@ -221,7 +221,7 @@ private:
             const MirroredWall<T>& wall = walls_[number];
             const auto list = runs.subspan(2, runs[1]);
             runs = runs.subspan(2 + runs[1]);
-            const Contacts at = contacts_with(*wall.wall, in, i);
+            const Contacts at = contacts_with(wall.wall, in, i);
             Vec3<V> G{zero, zero, zero}, B = G, P = G;
             for (const Index point : list) {
                 const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
@@ -249,7 +249,7 @@ private:
                 const auto of = [&](int first) {
                     return Vector{volume_ * sums[first][k], volume_ * sums[first + 1][k], volume_ * sums[first + 2][k]};
                 };
-                feel_wall(*wall.wall, in, i.first + k, at.contact[k], of(0), of(3), of(6), k, out, share);
+                feel_wall(wall.wall, in, i.first + k, at.contact[k], of(0), of(3), of(6), k, out, share);
             }
         }
         return pairs;

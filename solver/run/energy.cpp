@@ -84,7 +84,7 @@ std::string state_hash(const Team& team, const Particles& p)
         using F = decltype(f);
         const auto is = [](auto... g) { return (std::is_same_v<F, std::remove_const_t<decltype(g)>> || ...); };
         // not what never changes: where it began, id and soil; nor what walls did, which no step needs
-        if constexpr (!is(field::origin, field::id, field::soil, field::wall_force)) {
+        if constexpr (!is(field::origin, field::id, field::soil, field::wall_force, field::unstored)) {
             const auto columns = p[f];
             for (const auto* c : columns.column)
                 for (Index i = 0; i < n; ++i) {

@@ -96,12 +96,15 @@ void take_from_loads(std::span<const int> loads, Particles& p)
 
 namespace {
 
+Vector outward(const scene::Load& l) { return (1 / length(*l.normal)) * *l.normal; }
+
 /// Where one load's soil is seen along a normal: a particle covers a square of a spacing, and each of the samples, two a spacing, belongs
-/// to the soil that is seen there and what lies less than a support behind it.
+/// to the soil that is seen there and what lies just behind it.
 class SeenAlong {
 public:
-    SeenAlong(const Team& team, const Scene& scene, std::int32_t number, Vector normal, const Particles& p)
-        : team_(team), number_(number), dimensions_(scene.dimensions), spacing_(scene.space.spacing), support_(scene.support()),
+    /// `deep`: m, how far behind what is seen soil belongs to it.
+    SeenAlong(const Team& team, const Scene& scene, std::int32_t number, Vector normal, double deep, const Particles& p)
+        : team_(team), number_(number), dimensions_(scene.dimensions), spacing_(scene.space.spacing), deep_(deep),
           n_((1 / length(normal)) * normal), p_(p)
     {
         // In 2-D the first tangent lies in the plane, and all of y is one sample.
@@ -131,7 +134,7 @@ public:
             const double area = std::max(0.0, -dot(p_[field::load_push][i], n_));
             return std::int64_t(std::nearbyint(std::ldexp(area / area_of_particle(), 30))) + 1; // one at least: some soil is seen there
         };
-        const auto near = [&](Vector x, std::size_t k) { return dot(x, n_) >= top[k] - support_; };
+        const auto near = [&](Vector x, std::size_t k) { return dot(x, n_) >= top[k] - deep_; };
         for_each([&](Index i, Vector x) { for_each_sample(i, [&](std::size_t k) { weights[k] += near(x, k) ? weight(i) : 0; }); });
         team_.sum(std::span<std::int64_t>(weights));
         const double area = area_of_particle() / (dimensions_ == 3 ? 4 : 2);
@@ -171,7 +174,7 @@ private:
     const Team& team_;
     std::int32_t number_;
     int dimensions_;
-    double spacing_, support_;
+    double spacing_, deep_;
     Vector n_, a_, b_;
     std::array<double, 2> low_{};
     std::array<std::size_t, 2> count_{};
@@ -190,11 +193,87 @@ void set_pushes(const Team& team, const Scene& scene, std::span<const int> loads
                 if (std::as_const(p)[field::load][i] == number + 1) push.set(i, l.pressure.value_or(0) * push[i]);
             continue;
         }
-        const Vector n = (1 / length(*l.normal)) * *l.normal;
+        const Vector n = outward(l);
         std::vector<std::pair<Index, double>> areas;
-        SeenAlong(team, scene, number + 1, n, std::as_const(p)).share([&](Index i, double area) { areas.emplace_back(i, area); });
+        // Under a plate the face alone carries it.
+        const double deep = l.plate ? 0.5 * scene.space.spacing : scene.support();
+        SeenAlong(team, scene, number + 1, n, deep, std::as_const(p)).share([&](Index i, double area) { areas.emplace_back(i, area); });
+        for (Index i = 0; i < p.size(); ++i)
+            if (std::as_const(p)[field::load][i] == number + 1) push.set(i, Vector{});
         for (const auto& [i, area] : areas) push.set(i, area * (l.traction ? *l.traction : -l.pressure.value_or(0) * n));
     }
+}
+
+bool any_plate(const Scene& scene)
+{
+    return std::ranges::any_of(scene.loads, [](const scene::Load& l) { return l.plate; });
+}
+
+namespace {
+/// Calls visit(particle, mass) for this rank's soil under a plate.
+template <class Visit>
+void for_each_under(const Scene& scene, std::size_t load, std::span<const Material> soils, const Particles& p, Visit visit)
+{
+    for (Index i = 0; i < p.size(); ++i)
+        if (p[field::load][i] == std::int32_t(load + 1) && p[field::load_push][i] != Vector{})
+            visit(i, soils[std::size_t(p[field::soil][i])].density * scene.particle_volume());
+}
+/// Of each load's soil the mean by mass of a vector along its normal; 0 where it has no plate. Collective.
+template <class Of>
+std::vector<double> means_along(const Team& team, const Scene& scene, std::span<const Material> soils, const Particles& p, Of of)
+{
+    const std::size_t n = scene.loads.size();
+    const auto sums = exact_sums(team, 2 * n, [&](auto add) {
+        for (std::size_t l = 0; l < n; ++l)
+            if (scene.loads[l].plate && scene.loads[l].present)
+                for_each_under(scene, l, soils, p,
+                               [&](Index i, double mass) { add(2 * l, mass), add(2 * l + 1, mass * dot(of(i), outward(scene.loads[l]))); });
+    });
+    std::vector<double> means(n, 0.0);
+    for (std::size_t l = 0; l < n; ++l)
+        if (sums[2 * l] > 0) means[l] = sums[2 * l + 1] / sums[2 * l];
+    return means;
+}
+/// Calls visit(particle, unit normal, mean) for this rank's soil under plates.
+template <class Visit>
+void for_each_held(const Scene& scene, std::span<const Material> soils, const std::vector<double>& means, const Particles& p, Visit visit)
+{
+    for (std::size_t l = 0; l < scene.loads.size(); ++l)
+        if (scene.loads[l].plate && scene.loads[l].present)
+            for_each_under(scene, l, soils, p, [&](Index i, double) { visit(i, outward(scene.loads[l]), means[l]); });
+}
+} // namespace
+
+void join_plates(const Team& team, const Scene& scene, std::span<const Material> soils, Particles& p)
+{
+    const auto v = p[field::velocity];
+    const auto means = means_along(team, scene, soils, p, [&](Index i) { return v[i]; });
+    for_each_held(scene, soils, means, p, [&](Index i, Vector n, double mean) { v.set(i, v[i] + (mean - dot(v[i], n)) * n); });
+}
+
+void hold_plates(const Team& team, const Scene& scene, std::span<const Material> soils, const StepInput& in, PassResult& result)
+{
+    Particles& p = *in.particles;
+    const auto a = p[field::acceleration], v = p[field::velocity], unstored = p[field::unstored];
+    const auto means = means_along(team, scene, soils, p, [&](Index i) { return a[i]; });
+    const auto meet = [](double& most, Vector x) { most = std::max(most, dot(x, x)); };
+    const double magic = magic_of(in.energy_unit), half_next = 0.5 * in.next;
+    auto& maxima = result.maxima;
+    for_each_held(scene, soils, means, p, [&](Index i, Vector n, double mean) {
+        const Vector change = (mean - dot(a[i], n)) * n, before = v[i] - (0.5 * in.dt) * a[i];
+        const double mass = soils[std::size_t(p[field::soil][i])].density * scene.particle_volume();
+        // as the pass books it: work of forces, and of damping -mu (u + u')/2, u and u' the velocities half a step before and after
+        const auto booked = [&](Vector coming) {
+            const Vector damped = (-0.5 * in.forces.damping) * (before + coming);
+            return quantized(-mass * half_next * dot(unstored[i] + damped, coming), magic);
+        };
+        const double without = booked(v[i] + half_next * a[i]);
+        a.set(i, a[i] + change), v.set(i, v[i] + (0.5 * in.dt) * change);
+        const Vector coming = v[i] + half_next * a[i];
+        result.later.loads += booked(coming) - without;
+        meet(maxima.acceleration2, a[i]), meet(maxima.speed2, v[i]), meet(maxima.half_step_speed2, coming - in.frame);
+        meet(maxima.displacement2, p[field::position][i] + in.next * coming - p[field::sorted_position][i] - in.frame_way);
+    });
 }
 
 std::vector<LoadedSoil> loaded_soil(const Team& team, const Scene& scene, const Particles& p)

@@ -27,6 +27,16 @@ void take_from_loads(std::span<const int> loads, Particles&);
 /// those.
 void set_pushes(const Team&, const Scene&, std::span<const int> loads, Particles&);
 
+/// True where some load has a plate, now or later.
+bool any_plate(const Scene&);
+/// Collective. The soil under each plate gets one velocity along its normal, that of its momentum.
+void join_plates(const Team&, const Scene&, std::span<const Material>, Particles&);
+/// Collective. After the forces of a step: the soil under each plate is accelerated along its normal as one, by the forces on all of it.
+/// The plate gives and takes nothing, since its soil has one velocity along the normal; what is known already of the works of the half step
+/// to come (`later`) was booked for soil without it, and the difference goes to the account of loads. Largest speeds and ways join the
+/// maxima.
+void hold_plates(const Team&, const Scene&, std::span<const Material>, const StepInput&, PassResult&);
+
 /// What a load pushes: its particles, and their force together as it began, N, of all of it (factor 1).
 struct LoadedSoil {
     std::string name;

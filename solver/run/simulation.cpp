@@ -102,6 +102,7 @@ void Simulation::prepare()
                            std::ranges::any_of(scene_.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; }));
     if (remembering_) particles_.require(field::opened_volume);
     if (!scene_.loads.empty()) particles_.require(field::load, field::load_push);
+    if (any_plate(start_scene_)) particles_.require(field::unstored);
     loads_ = loads_now(scene_);
     if (wall_forces_.any()) particles_.require(field::wall_force);
     if (scene_.accuracy.sleep_below > 0) {
@@ -161,6 +162,7 @@ PassResult Simulation::run_stages(const StepInput& in)
         if (!moving_.empty()) place_walls(in, stage + 1 < stages); // strains are those of mid-step
         result.add(run_stage(stage, in));
     }
+    if (any_plate(scene_)) hold_plates(comm_, scene_, soils_, in, result);
     return result;
 }
 

@@ -57,6 +57,7 @@ void Simulation::begin_loads(const Scene& before)
     for (const int l : fresh) loads_[std::size_t(l)] = {.pressure = unit_pressure(scene_), .measured = true};
     evaluate_anew();
     set_pushes(comm_, scene_, fresh, particles_);
+    if (any_plate(scene_)) join_plates(comm_, scene_, soils_, particles_);
     loads_ = loads_now(scene_);
 }
 

@@ -44,6 +44,7 @@ std::string in_words(const Scene& s, int load)
     if (!l.body.empty()) text += " of body " + l.body;
     if (l.box) text += " in " + vector(l.box->low) + " to " + vector(l.box->high) + " m";
     if (l.follow) text += ", as they are at each time";
+    if (l.plate) text += ", under a plate";
     if (l.factor != 1) text += fmt::format(", {:.6g} of it", l.factor);
     return text;
 }
@@ -67,6 +68,12 @@ void check_loads(const Scene& s, Issues& issues)
             error(".follow",
                   "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; leave "
                   "one out");
+        if (l.plate && !l.normal)
+            error(".plate",
+                  "expected a normal with a plate, along which it moves, found none; for a level one write normal = [0.0, 0.0, 1.0]");
+        if (l.plate && s.accuracy.sleep_below > 0)
+            error(".plate",
+                  "expected accuracy.sleep_below = 0 with a plate, whose soil cannot sleep apart, found more; leave sleep_below out");
         if (s.dimensions == 2 && ((l.traction && l.traction->y != 0) || (l.normal && l.normal->y != 0)))
             error("", "expected no traction and no normal along y in two dimensions, found some; write 0.0");
         if (!l.body.empty() && body_named(s, l.body) < 0)

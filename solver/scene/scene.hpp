@@ -113,6 +113,7 @@ struct Load {
     std::optional<Vector> traction = {}; // Pa
     std::optional<Vector> normal = {};   // of the face, outward, of any length; absent: every face
     bool follow = false;                 // the pressure acts on the face as it is now, else as it was when the load began
+    bool plate = false;                  // what it pushes moves along the normal as one: a weightless plate lies on it
     double factor = 1;                   // how much of it acts
     bool present = true;                 // as of a body
     bool operator==(const Load&) const = default;

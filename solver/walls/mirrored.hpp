@@ -9,7 +9,7 @@ namespace kuzure {
 
 /// Points of one wall as the pair loop reads them.
 template <class T> struct MirroredWall {
-    const scene::Wall* wall;
+    scene::Wall wall; // its own: the scene's are others after an event
     Array<Coordinate<T>> x, y, z;
 };
 

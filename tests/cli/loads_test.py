@@ -7,6 +7,7 @@ import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+import h5py
 from harness import check, scratch, vector
 from runs import Runs, run_parts
 
@@ -200,6 +201,53 @@ def traction():
         check(still < 1e-6, f"{dimensions}-D: and the speed stays: {still:.1e}")
 
 
+def plate():
+    """A strip of load on a wide body sinks as one under a plate, and bends without one; the floor bears the same."""
+    q, wide = 4.0e4, 3.0
+    strip = (-1, 0, 1 - 3 * D), (0.8 + D / 10, 0, 2)
+    sunk = {}
+    for way, sign in (("plate", 1), ("mirrored", -1), ("bare", 1)):
+        mirrored = lambda low, high: sorted((sign * low, sign * high))  # noqa: E731
+        x, s = mirrored(0, wide), mirrored(strip[0][0], strip[1][0])
+        parts = [
+            body((x[0], 0, 0), (x[1], 0, 1), 'stress = "at rest"\n'),
+            wall((x[0] - 0.4, 0, -0.4), (x[1] + 0.4, 0, 0), 'surface = "rough"\nname = "floor"'),
+            wall((-0.4, 0, 0), (0, 0, 2)) if sign > 0 else wall((0, 0, 0), (0.4, 0, 2)),
+            load(
+                f"pressure = {q}",
+                (s[0], 0, strip[0][2]),
+                (s[1], 0, 2),
+                f'normal = [0.0, 0.0, 1.0]\nname = "footing"\nfactor = 0.0\nplate = {"false" if way == "bare" else "true"}',
+            ),
+            '[[event]]\nfrom = 0.02\nto = 0.22\nload = { name = "footing", factor = 1.0 }\n',
+        ]
+        path = scene(way, text(parts, end=0.5, effects=G + "damping = { ratio = 0.5, until = 9.0 }\n", time="step = 4.0e-4"))
+        run(path, way)
+        with h5py.File(runs.path(way, "checkpoint.h5")) as f:
+            p = f["particles"]
+            under = (p["load"][:] == 1) & (abs(p["load_push"][:]).max(axis=1) > 0.5 * q * D)
+            sunk[way] = (p["origin"][:] - p["position"][:])[under][:, 2]
+        pushed = force(way)
+        check(len(sunk[way]) == 8 and math.dist(pushed, (0, 0, -0.8 * q)) < 1e-6 * q, f"{way}: eight columns, {pushed}")
+        off, largest = unaccounted(way)
+        check(max(map(abs, off)) < 1e-3 * largest, f"{way}: ledger: {max(map(abs, off)) / largest:.1e}")
+        forces = [r for r in table(way, "forces.csv") if r["time"] > 0.4]
+        mean = (forces[-1]["impulse_z"] - forces[0]["impulse_z"]) / (forces[-1]["time"] - forces[0]["time"])
+        bears = DENSITY * 9.81 * wide + 0.8 * q
+        check(abs(-mean / bears - 1) < 1e-3, f"{way}: the floor bears {bears:.0f} N: {-mean:.1f} N")
+    level, bent = (max(sunk[w]) - min(sunk[w]) for w in ("plate", "bare"))
+    check(
+        level < 1e-12 and bent > 1e-4,
+        f"under the plate all sink by {max(sunk['plate']):.5f} m ({level:.0e} apart), without by {bent:.1e} m more or less",
+    )
+    check(0.8 < max(sunk["plate"]) / (sum(sunk["bare"]) / 8) < 1.05, "as deep as the mean without one, or a little less")
+    apart = abs(max(sunk["plate"]) / max(sunk["mirrored"]) - 1)
+    check(apart < 1e-9, f"in the mirror: {apart:.1e}")
+    for ranks, threads in ((1, 2), (4, 1)):
+        run(runs.path("plate.toml"), "plate again", ranks, threads, ["--force", "--recut-every", "2"])
+        check(summary("plate again")["state_hash"] == summary("plate")["state_hash"], f"{ranks} x {threads}: the same bits")
+
+
 BITS = [
     body((0, 0, 0), (2, 0, 1), 'name = "bank"\nstress = "at rest"\n'),
     wall((-0.4, 0, -0.4), (3.4, 0, 0), 'surface = { friction_angle = 20.0 }\nname = "floor"'),
@@ -237,6 +285,9 @@ def bits():
     check(summary("stopped")["state_hash"] == one["state_hash"], f"taken up {leg + 1} times: the bits of one run")
     off, largest = unaccounted("one")
     check(max(map(abs, off)) < 3e-3 * largest, f"ledger: {max(map(abs, off)) / largest:.1e}")
+    page = runs.read("one", "report.html")
+    for words in ("load truck is added", "Force on wall floor", "footing", "<h2>Events, loads, forces on walls"):
+        check(words in page, f"the report says: {words}")
 
 
 def refused():
@@ -255,6 +306,11 @@ def refused():
             "a box inside out": (with_(load("pressure = 1.0", (1, 0, 1), (0, 0, 2))), "low below high"),
             "no soil": (with_(load("pressure = 1.0", (0, 0, 5), (1, 0, 6))), "expected soil"),
             "two on one": (with_(good + load("pressure = 1.0")), "no other load"),
+            "a plate without a normal": (with_(load("pressure = 1.0", more="plate = true")), "expected a normal with a plate"),
+            "a plate on sleepers": (
+                with_(load("pressure = 1.0", more="plate = true\nnormal = [0.0, 0.0, 1.0]") + "[accuracy]\nsleep_below = 0.001\n"),
+                "sleep",
+            ),
             "along y": (with_(load("traction = [0.0, 1.0, 0.0]", more="normal = [0.0, 0.0, 1.0]")), "two dimensions"),
             "names": (with_(good.replace("fill", "floor")), "no other wall, body or load"),
             "unknown": (with_(good + '[[event]]\nat = 0.05\nload = { name = "hill", factor = 1.0 }\n'), "hill"),
@@ -273,4 +329,4 @@ def refused():
 
 
 if __name__ == "__main__":
-    run_parts(oedometer, at_rest, all_round, turned, traction, bits, refused)
+    run_parts(oedometer, at_rest, all_round, turned, traction, plate, bits, refused)

@@ -139,6 +139,45 @@ void read_scene(Record& r)
     }
 }
 
+/// Calls visit(cells) for the rows of a table of text that have a cell for each name; rows without end are not there.
+template <class Visit> void for_each_row(std::string_view text, Visit visit)
+{
+    std::size_t names = 0;
+    for (int line = 0; !text.empty(); ++line) {
+        const std::size_t end = text.find('\n');
+        if (end == text.npos) return;
+        std::vector<std::string> cells(1);
+        for (const char c : text.substr(0, end))
+            if (c == ',') cells.emplace_back();
+            else cells.back() += c;
+        text.remove_prefix(end + 1);
+        if (line == 0) names = cells.size();
+        else if (line > 1 && cells.size() == names) visit(cells);
+    }
+}
+
+void read_stages(Record& r, Reader& from)
+{
+    constexpr std::size_t most_walls = 100;
+    if (from.there("events.csv"))
+        for_each_row(from.text("events.csv", "what happened is unknown"), [&](const auto& cells) { r.events.push_back(cells); });
+    if (!from.there("forces.csv")) return;
+    const std::string text = from.text("forces.csv", "no forces on walls", 128 * MiB);
+    std::map<std::string, std::string> rows; // by wall
+    std::vector<std::string> order;
+    for_each_row(text, [&](const auto& cells) {
+        if (cells.size() < 3) return;
+        const auto found = rows.find(cells[1]);
+        if (found == rows.end() && rows.size() == most_walls) return;
+        if (found == rows.end()) order.push_back(cells[1]);
+        std::string& to = rows[cells[1]];
+        for (std::size_t k = 0; k < cells.size(); ++k) to += (k ? "," : "") + cells[k];
+        to += '\n';
+    });
+    const std::size_t head = text.find('\n');
+    for (const auto& wall : order) r.forces.emplace_back(wall, read_table(text.substr(0, head) + "\n#\n" + rows[wall]));
+}
+
 void find_pictures(Record& r, Reader& from)
 {
     std::error_code error;
@@ -180,6 +219,7 @@ Record read_record(const io::Path& directory)
     r.scene = from.text("scene.toml", "the scene is unknown", MiB + 4096);
     r.title = directory.filename().empty() ? directory.parent_path().filename().string() : directory.filename().string();
     if (!r.scene.empty()) read_scene(r);
+    read_stages(r, from);
     find_pictures(r, from);
     std::error_code error;
     for (const char* name : {"movie.mp4", "movie.webm", "movie.gif"})

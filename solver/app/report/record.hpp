@@ -21,7 +21,9 @@ struct Record {
     io::Path directory;
     nlohmann::json summary = nlohmann::json::object(), timers = nlohmann::json::object(); // empty where missing or damaged
     Table history, progress;
-    std::vector<io::Path> pictures; // in order of time
+    std::vector<std::vector<std::string>> events;      // cells of events.csv, without its first two lines
+    std::vector<std::pair<std::string, Table>> forces; // of each wall that has a name
+    std::vector<io::Path> pictures;                    // in order of time
     std::vector<double> picture_times;
     io::Path movie;                 // empty: none
     std::string scene, title;       // text of scene.toml

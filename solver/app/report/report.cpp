@@ -1,6 +1,7 @@
 #include "solver/app/report/report.hpp"
 #include "solver/app/report/chart.hpp"
 #include "solver/app/report/page.hpp"
+#include "solver/app/report/stages.hpp"
 #include "solver/app/report/values.hpp"
 #include "solver/core/simd.hpp"
 #include <algorithm>
@@ -184,15 +185,17 @@ std::string energy(const Record& r)
     const auto t = column(r.history, "time");
     std::vector<double> percent;
     for (const double v : column(r.history, "residual")) percent.push_back(100 * v);
-    return "<div class=\"pair\">\n" +
-           chart("Energies", "time", "s", t, r.flat ? "J/m" : "J",
-                 curves(r.history, {{"kinetic", "kinetic"},
-                                    {"potential", "potential"},
-                                    {"elastic", "elastic"},
-                                    {"plastic", "plastic"},
-                                    {"viscous", "viscous"},
-                                    {"wall", "wall"},
-                                    {"damping", "damping"}})) +
+    auto accounts = curves(r.history, {{"kinetic", "kinetic"},
+                                       {"potential", "potential"},
+                                       {"elastic", "elastic"},
+                                       {"plastic", "plastic"},
+                                       {"viscous", "viscous"},
+                                       {"wall", "wall"},
+                                       {"damping", "damping"}});
+    // of stages, where there are some
+    for (const auto& curve : curves(r.history, {{"moved_wall", "moved walls"}, {"events", "events"}, {"loads", "loads"}}))
+        if (std::ranges::any_of(curve.y, [](double joules) { return std::fabs(joules) > 0; })) accounts.push_back(curve);
+    return "<div class=\"pair\">\n" + chart("Energies", "time", "s", t, r.flat ? "J/m" : "J", accounts) +
            chart("Energy residual", "time", "s", t, "%", {{"share of the potential drop", percent}}) + "</div>\n";
 }
 
@@ -332,6 +335,7 @@ std::string html(const Record& r)
     std::string s = opening(r);
     s += section("pictures", "Pictures", pictures(r));
     s += section("maps", "Maps", maps(r));
+    s += section("stages", "Events, loads, forces on walls", stages(r));
     s += section("energy", "Energy", energy(r));
     s += section("heap", "The heap", heap(r));
     s += section("error-bars", "The answer and its error bars", error_bars(r));
