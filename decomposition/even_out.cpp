@@ -456,7 +456,7 @@ EvenReport DiffusiveBalancer::run()
     double sums[3] = {0, 0, 0};
     for (const Part& p : parts_) {
         sums[0] += p.work, sums[1] += p.blocks;
-        for (const int b : p.home) sums[2] += p.g.particles[b] * p.g.grid.row_bytes;
+        for (const int b : p.home) sums[2] += p.g.particles[b] * p.g.grid.ghost_bytes;
     }
     group_.sum(sums);
     mean_ = report_.mean = sums[0] / group_.size();

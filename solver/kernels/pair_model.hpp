@@ -85,10 +85,10 @@ struct WallStep {
     }
 };
 
-/// One stage of a step: a pass over all clusters, and the exchange of ghost rows before it.
+/// One stage of a step: a pass over all clusters, and the exchange of ghosts before it.
 struct Stage {
     const char* name;
-    std::size_t row_bytes; // of a ghost
+    std::size_t ghost_bytes; // of a ghost
     /// Floating-point operations of one directed pair (an fma counts two; square root, division, min and max one), and of
     /// the update of one particle; bytes of main memory that one particle's update moves: for the roofline.
     double flops_per_pair, flops_per_particle, bytes_per_particle;
@@ -128,7 +128,8 @@ public:
     virtual PassResult run(int stage, const StepInput&, std::span<const Index> clusters) = 0;
     /// After the last cluster of a stage.
     virtual void end_stage(int stage) = 0;
-    /// Ghost rows of a stage: that of an owned particle seen from another period (m), and back to its slot. Threads call them at once.
+    /// Ghosts of a stage, a record each: that of an owned particle seen from another period (m), and back to its slot. Threads call them at
+    /// once.
     virtual void pack(int stage, Index owned, Vector shift, std::byte* to) const = 0;
     virtual void unpack(int stage, Index slot, const std::byte* from) = 0;
 
@@ -139,8 +140,8 @@ public:
     virtual std::size_t bytes() const = 0;
 };
 
-/// Bytes of the ghost rows of one particle in a whole step.
-std::size_t row_bytes(const PairModel&);
+/// Bytes of the ghost records of one particle in a whole step.
+std::size_t ghost_bytes(const PairModel&);
 
 /// The cheapest compiled model that contains every pair term of the scene (whose "auto" effects are resolved).
 std::unique_ptr<PairModel> choose_model(const scene::Interactions&, Arithmetic);

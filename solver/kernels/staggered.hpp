@@ -22,7 +22,7 @@ public:
     explicit Staggered(const scene::Interactions& s) : Base(s), stages_{Base::strain_stage(), Base::force_stage()} {}
     std::string name() const override { return "staggered, " + Base::lanes_name(); }
     std::span<const Stage> stages() const override { return stages_; }
-    std::size_t record_bytes() const override { return stages_[0].row_bytes + stages_[1].row_bytes; }
+    std::size_t record_bytes() const override { return stages_[0].ghost_bytes + stages_[1].ghost_bytes; }
     PassResult run(int stage, const StepInput& in, std::span<const Index> clusters) override
     {
         return stage == 0 ? Base::run_strain(in, clusters) : Base::run_force(in, clusters);

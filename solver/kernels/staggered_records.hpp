@@ -1,5 +1,5 @@
 #pragma once
-// Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghost rows and the walls. A stage reads
+// Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghosts and the walls. A stage reads
 // of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice.
 #include "solver/kernels/cluster_pass.hpp"

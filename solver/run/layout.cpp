@@ -73,9 +73,9 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
 
 void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model)
 {
-    std::vector<std::size_t> rows;
-    for (const Stage& s : model.stages()) rows.push_back(s.row_bytes);
-    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), rows);
+    std::vector<std::size_t> ghost_bytes;
+    for (const Stage& s : model.stages()) ghost_bytes.push_back(s.ghost_bytes);
+    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), ghost_bytes);
     const auto arrived = halo_->ghosts(p);
     const auto n = Index(arrived.size());
     Array<double> x(n), y(n), z(n);
@@ -92,7 +92,7 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
         ghost_soil_[k] = arrived[from].soil;
         slot[from] = k;
     }
-    halo_->place(slot);
+    halo_->assign_slots(slot);
 }
 
 void Layout::renew_walls(const Particles& p, PairModel& model)

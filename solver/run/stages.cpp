@@ -82,9 +82,9 @@ void Simulation::change_bodies(const Scene& before)
         model_->start(fresh);
         std::vector<Index> all(std::size_t(fresh.size()));
         std::iota(all.begin(), all.end(), 0);
-        std::vector<std::byte> rows;
-        fresh.pack(all, rows);
-        particles_.unpack(rows);
+        std::vector<std::byte> bytes;
+        fresh.pack(all, bytes);
+        particles_.unpack(bytes);
     }
     if (any(goes) || any(comes)) balance_.cut_state(scene_, particles_, layout_, false, [] {});
 }

@@ -27,8 +27,8 @@ State state_of(const Comm&, const Scene&, const io::Path& from);
 Case count_case(const Scene&, const scene::Filling&, const Estimate&, StepPlace, const std::vector<Vector>& x, Method);
 
 nlohmann::ordered_json to_json(const std::vector<ReplayedCut>&);
-/// `row_bytes`: of a ghost's record.
-nlohmann::ordered_json to_json(const Case&, double row_bytes, bool per_rank);
+/// `ghost_bytes`: of a ghost's record.
+nlohmann::ordered_json to_json(const Case&, double ghost_bytes, bool per_rank);
 /// Tables for people; `state` says which soil was counted.
 std::string to_text(const std::vector<Case>&, const Scene&, const StepPlace&, std::int64_t soil, const std::string& state);
 
