@@ -32,7 +32,7 @@ private:
     int descriptor_, error_ = 0;
     bool cut_ = false;                                        // end_ counts, not the file's own length
     std::uint64_t end_ = 0;                                   // while writing
-    std::map<std::uint64_t, std::vector<std::byte>> written_; // by place; pieces neither overlap nor touch
+    std::map<std::uint64_t, std::vector<std::byte>> written_; // by offset; pieces neither overlap nor touch
 };
 
 /// The HDF5 library from here on reports to us and not to the terminal, and does no clean-up when the program or MPI ends: every file is

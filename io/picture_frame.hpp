@@ -30,7 +30,7 @@ struct Reach {
     double least = HUGE_VAL, most = -HUGE_VAL;           // of the values that colour it
     double percent_1 = HUGE_VAL, percent_99 = -HUGE_VAL; // of them, of each state
 };
-/// Values and places that are no numbers do not count.
+/// Values and positions that are no numbers do not count.
 Reach reach_of(std::span<const Vector> positions, std::span<const double> values);
 Reach joined(const Reach&, const Reach&);
 

@@ -120,7 +120,7 @@ Header header(const Path& path, Words& words, bool geographic)
         return needed(at_corner);
     };
     h.grid =
-        placed(corner("xllcorner", "xllcenter"), corner("yllcorner", "yllcenter"), cell, std::int64_t(columns), std::int64_t(rows), file);
+        grid_at(corner("xllcorner", "xllcenter"), corner("yllcorner", "yllcenter"), cell, std::int64_t(columns), std::int64_t(rows), file);
     if (values.contains("nodata_value")) h.nodata = values["nodata_value"];
     return h;
 }

@@ -280,7 +280,7 @@ private:
             if (walled) all = before + wall;
         told.store(lanes.at, select(written<U>(lanes), all, before), lanes.n);
     }
-    struct Moved { // after the step: place, velocity half a step before, velocity, acceleration
+    struct Moved { // after the step: position, velocity half a step before, velocity, acceleration
         Vec3<U> x, u, v, a;
     };
     struct Forces { // per unit of mass, m/s^2

@@ -51,35 +51,35 @@ struct StepInput {
 
 /// Where a wall stands at the start of a step, at its end and at that of the next, seen from where it stood when the model's walls were
 /// set.
-struct WallPlace {
+struct WallPoses {
     scene::Pose before, after, later;
 };
 /// All walls of a scene in a step of length dt before one of length `next`, s; of no length: at its end.
 struct WallStep {
-    std::span<const WallPlace> walls;
+    std::span<const WallPoses> walls;
     double dt, next;
     bool midway; // of the step, else at its end
     /// Mean velocity (m/s) of what was at x (m) when walls were set, in this step and in the next.
     Vector velocity(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         return dt > 0 ? (1 / dt) * (scene::placed(w.after, x) - scene::placed(w.before, x)) : next_velocity(wall, x);
     }
     Vector next_velocity(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         return (1 / next) * (scene::placed(w.later, x) - scene::placed(w.after, x));
     }
     /// Where that is now; half-way along the chord, as soil is at mid-step.
-    Vector place(int wall, Vector x) const
+    Vector position(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         const Vector after = scene::placed(w.after, x);
         return midway ? 0.5 * (scene::placed(w.before, x) + after) : after;
     }
     Vector turned(int wall, Vector normal) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         const Vector after = scene::turned(w.after, normal), n = midway ? scene::turned(w.before, normal) + after : after;
         return (1 / length(n)) * n;
     }

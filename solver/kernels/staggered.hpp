@@ -3,7 +3,7 @@
 // that of time t^n: x, v, sigma, rho, and the acceleration a^n. A step of length dt is
 //
 //     v^{n+1/2} = v^n + dt/2 a^n,  x^{n+1} = x^n + dt v^{n+1/2}                                       move
-//     L = grad v^{n+1/2} at the places of mid-step; rho, sigma -> n+1; viscous force                  stage 0, "strain"
+//     L = grad v^{n+1/2} at the positions of mid-step; rho, sigma -> n+1; viscous force                  stage 0, "strain"
 //     a^{n+1} from sigma^{n+1} at x^{n+1} and that viscous force;  v^{n+1} = v^{n+1/2} + dt/2 a^{n+1}  stage 1, "force"
 //
 // The geometry of L must be that of mid-step: at x^{n+1} it makes an energy error of (dt/2) sigma : L.L, first order. A stage reads of

@@ -14,7 +14,7 @@
 //
 // A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
 // nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's. Where the wall of that face
-// moves, v_i less the velocity of the face takes the place of v_i, and its power counts apart.
+// moves, v_i less the velocity of the face stands for v_i, and its power counts apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/scene/height_field.hpp"

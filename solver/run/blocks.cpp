@@ -282,7 +282,7 @@ std::vector<Block> StartSoil::blocks() const
         };
         Block lo = corner(inside(box.low)), hi = corner(inside(box.high)), at;
         for (int a = 0; a < 3; ++a) {
-            // Across a period the corners may have changed places.
+            // Across a period the corners may have been exchanged.
             if (lo[a] > hi[a]) lo[a] = least[a], hi[a] = most[a];
         }
         for (at[0] = lo[0]; at[0] <= hi[0]; ++at[0])

@@ -65,7 +65,7 @@ public:
     const BlockSpace& space() const { return space_; }
 
 protected:
-    /// A text that two blocks share only if they and the blocks around them hold soil and walls in the same places relative
+    /// A text that two blocks share only if they and the blocks around them hold soil and walls at the same points relative
     /// to the block; empty where that is undefined.
     virtual std::string pattern_key(const Block&) const { return {}; }
 

@@ -64,7 +64,7 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
         lists_.build(columns_, owned, around, walls_, reach_, model.cluster_width());
         model.make_records(p, soils, ghost_soil_);
     });
-    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its place and record.
+    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its position and record.
     const auto entries = double(lists_.entries() + lists_.wall_entries());
     timers.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + model.record_bytes() / 2));
     pruned_margin_ = 0;

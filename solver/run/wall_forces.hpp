@@ -32,7 +32,7 @@ public:
 
 private:
     struct Seen;
-    /// visit(number in walls_, place, force on the wall) for every particle of a cluster and every named wall in its reach.
+    /// visit(number in walls_, position, force on the wall) for every particle of a cluster and every named wall in its reach.
     template <class Visit> void for_each_force(const Particles&, Index cluster, Visit visit) const;
     /// A particle in reach of several walls is shared among them by what its stress does to the faces of each, as the pair loop has it; the
     /// rest, of viscosity and friction, by how much it sees of each and which way that can bear.

@@ -21,7 +21,7 @@ public:
         double mass;    // kg/m^2
         double surface; // m, height of the highest soil that counts
     };
-    /// Above a particle of a body at its place (m).
+    /// Above a particle of a body at its position (m).
     Above above(Vector x, int body) const;
 
 private:

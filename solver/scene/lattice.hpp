@@ -16,7 +16,7 @@
 
 namespace kuzure::scene {
 
-/// Coordinate (m) of lattice point k along one axis: the only place where it is computed.
+/// Coordinate (m) of lattice point k along one axis: computed here and nowhere else.
 inline double lattice_coordinate(double origin, std::int64_t k, double spacing) { return origin + (double(k) + 0.5) * spacing; }
 
 /// Points of a regular grid: lattice points first .. first + n - 1 along each axis.

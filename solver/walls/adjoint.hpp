@@ -8,7 +8,7 @@
 //
 // the force's power v . f equals -sigma : L, so that a fixed wall neither gives nor takes energy. Rough: P = 1; smooth and Coulomb:
 // P = n (x) n. Coulomb's friction is a traction of its own (friction.hpp).
-// Where a wall moves, v_i - v_w takes the place of v_i, v_w the velocity of the surface: the force's power is then -sigma : L and that of
+// Where a wall moves, v_i - v_w stands for v_i, v_w the velocity of the surface: the force's power is then -sigma : L and that of
 // the wall, f . v_w, which is booked apart (moved_wall).
 #include "solver/core/memory.hpp"
 #include "solver/pairs/cluster.hpp"

@@ -63,7 +63,7 @@ template <class Visit> void for_each_face(const scene::Ground& g, Vector x, int,
 {
     const auto n = g.field->nearest(x);
     if (!std::isfinite(n.distance)) return;
-    // The way itself is the normal: so also at the focus of a hollow, where many places are as near.
+    // The way itself is the normal: so also at the focus of a hollow, where many points are as near.
     const Vector way = x - n.point;
     const bool far = std::fabs(n.distance) > 1e-6 * g.field->grid().cell;
     visit(Candidate{n.point, far ? (1 / n.distance) * way : n.normal});

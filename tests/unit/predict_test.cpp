@@ -31,7 +31,7 @@ TEST(Predict, TwoRanksOfTwoNodesByHand)
     RankLoad r{
         .pairs = 1e6, .particles = 2e4, .rim = 2000, .sent = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_ghosts = 1000};
     const std::vector<RankLoad> even{r, r};
-    StepPlace at{.machine = m, .ranks = 2, .ranks_per_node = 1, .ghost_bytes = 100};
+    Deployment at{.machine = m, .ranks = 2, .ranks_per_node = 1, .ghost_bytes = 100};
     auto s = predict_step(even, at);
     // 1000 rows of 100 bytes: 0.1 ms on the wire and one latency, hidden behind 2.5 ms of pairs, 85 % of them interior.
     EXPECT_DOUBLE_EQ(s.network, 1e-6 + 1e-4);
@@ -61,7 +61,7 @@ TEST(Predict, CutsAsOftenAsItPays)
     const auto m = plain();
     const RankLoad r{.pairs = 1e7, .particles = 2e5, .messages = 1};
     const std::vector<RankLoad> ranks(64, r);
-    StepPlace at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
+    Deployment at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
     const auto few = predict_step(ranks, at);
     // A cut's seconds C come every sqrt(2 C/(d t)) steps of t seconds, d = 6.1e-5 (35152/n)^0.56.
     const auto cut_of = [](const StepSeconds& s) { return 0.5 * s.recut * s.recut_steps; };

@@ -500,7 +500,7 @@ inline Placed block_above(const Generated& g, Draw& draw, bool moving = true)
     return p;
 }
 struct Motions {
-    double apart = 0;            // largest difference of a place from the first drawing's, over the block's size
+    double apart = 0;            // largest difference of a position from the first drawing's, over the block's size
     double taken = 0, given = 0; // most and least work taken by walls, over the largest energy met till then
     double moved = 0;            // m, farthest way up or down in the first drawing
 };

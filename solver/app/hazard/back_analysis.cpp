@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* mark = "fit_plan.json";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step
-/// Times the layers of the best run, for particles at other places: enough to move all of them, too few for another answer.
+/// Times the layers of the best run, for particles at other positions: enough to move all of them, too few for another answer.
 constexpr std::array twin_layers{1.08, 1.17};
 /// Below it soil is recorded too, so that outlines can be drawn through the cells in between.
 constexpr double recorded = 0.1;
@@ -265,7 +265,7 @@ private:
             }
     }
 
-    /// The best values once more with particles at other places: what comes out otherwise is not the input's doing.
+    /// The best values once more with particles at other positions: what comes out otherwise is not the input's doing.
     void twins()
     {
         const auto v = judge(axes_, trials(), alike());

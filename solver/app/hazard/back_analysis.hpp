@@ -36,7 +36,7 @@ struct BackState {
     std::string scene_file;
     const Observed& observed;
     const std::vector<Axis>& axes;
-    std::vector<Tried> tried, twins; // twins: the best values with the particles at other places
+    std::vector<Tried> tried, twins; // twins: the best values with the particles at other positions
     std::optional<Verdict> verdict = {};
     double alike = 0, of_cells = 0, of_curve = 0, of_twins = 0; // misfits; of_twins NaN: not known
     double cell = 0, wet = 0, layers = 0, spacing = 0, ended = 0;

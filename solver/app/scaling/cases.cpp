@@ -50,7 +50,8 @@ State state_of(const Comm& comm, const Scene& s, const io::Path& from)
     return {std::move(x), std::move(way)};
 }
 
-Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e, StepPlace at, const std::vector<Vector>& x, Method method)
+Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e, Deployment at, const std::vector<Vector>& x,
+                Method method)
 {
     const int n = at.ranks;
     const BlockSpace space = block_space(s, filling, n);
@@ -142,7 +143,7 @@ nlohmann::ordered_json to_json(const Case& c, double ghost_bytes, bool per_rank)
     return j;
 }
 
-std::string to_text(const std::vector<Case>& cases, const Scene& s, const StepPlace& at, std::int64_t soil, const std::string& state)
+std::string to_text(const std::vector<Case>& cases, const Scene& s, const Deployment& at, std::int64_t soil, const std::string& state)
 {
     std::string text;
     const auto add = [&]<class... T>(fmt::format_string<T...> format, T&&... values) {

@@ -39,7 +39,7 @@ double imbalance_growth(double particles) { return 6.1e-5 * std::pow(35152 / std
 
 } // namespace
 
-StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
+StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
 {
     const auto& c = at.machine.cost;
     const double cores = double(at.machine.node.cores) / at.ranks_per_node;
@@ -135,7 +135,7 @@ double predict_seconds(const Estimate& e, const io::MachineProfile& m, int nodes
                .messages = std::min(26.0, ranks - 1)};
     r.far_messages = nodes > 1 ? r.messages : 0;
     r.node_ghosts = nodes > 1 ? shell(n * ranks_per_node) : 0;
-    const StepPlace at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
+    const Deployment at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
     return double(e.steps) * predict_step(std::span(&r, 1), at).total();
 }
 

@@ -37,15 +37,15 @@ struct StepSeconds {
     double total() const { return pairs + particles + imbalance + halo + reduction + rebuild + recut; }
 };
 
-/// Where a step is done. Cores of a node are shared evenly by its ranks.
-struct StepPlace {
+/// Machine, ranks and nodes of a run. Cores of a node are shared evenly by its ranks.
+struct Deployment {
     const io::MachineProfile& machine;
     int ranks = 1, ranks_per_node = 1;
     double ghost_bytes = 128, blocks = 0;
     bool mixed = false;
     double latency_times = 1, bandwidth_times = 1; // for questions of sensitivity
 };
-StepSeconds predict_step(std::span<const RankLoad>, const StepPlace&);
+StepSeconds predict_step(std::span<const RankLoad>, const Deployment&);
 /// The loads of a counted cut, its ranks on nodes in order.
 std::vector<RankLoad> loads(const CutShare&, int ranks_per_node);
 
