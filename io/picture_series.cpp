@@ -154,7 +154,7 @@ private:
         Extent frame;
         ColorRange range;
     };
-    bool in_slice(const Vector& p) const { return view_ != scene::View::Cut || std::fabs(p.y - middle_) <= task_.spacing; }
+    bool in_slice(const Vector& p) const { return view_ != scene::View::Slice || std::fabs(p.y - middle_) <= task_.spacing; }
     Place file_of(const State& s) const { return task_.file ? task_.file(s.number) : picture_file(task_.results, s.number); }
     void complain(const std::string& what)
     {
@@ -180,7 +180,7 @@ private:
                 try {
                     const H5Reader in(states_[first_].file);
                     const SoilColor color(in, task_.color);
-                    if (view_ != scene::View::Cut) break;
+                    if (view_ != scene::View::Slice) break;
                     const auto soil = color.read(in);
                     const Reach r = reach_of(soil.positions, {});
                     if (!r.all.empty()) middle_ = 0.5 * (r.all.low.y + r.all.high.y);
@@ -335,7 +335,7 @@ private:
     scene::View view_;
     std::size_t first_ = 0; // good state
     Place first_file_;
-    double middle_ = 0; // m, where the slice is cut
+    double middle_ = 0; // m, where the slice lies
     std::optional<SoilColor> color_;
     int digits_ = 0;
     std::size_t kept_ = 0;  // bytes

@@ -143,7 +143,7 @@ Raster read_ascii(const Path& path, const std::optional<Window>& window)
     const auto crs = crs_beside(path);
     const auto h = header(path, words, geographic(crs));
     const Part part = part_of(h.grid, window, path.string());
-    Raster r{cut(h.grid, part), crs};
+    Raster r{crop(h.grid, part), crs};
     if (part.empty()) return r;
     const double nodata = h.nodata.value_or(-9999);
     std::string_view word = h.first;

@@ -14,7 +14,7 @@ struct Part {
 /// The cells whose area meets the window. Throws BadInput where they are more than memory should hold.
 Part part_of(const scene::Grid& whole, const std::optional<Window>&, const std::string& file);
 /// A grid of these cells, all NaN.
-scene::Grid cut(const scene::Grid& whole, const Part&);
+scene::Grid crop(const scene::Grid& whole, const Part&);
 
 /// A grid of one cell size whose south-west corner is at these coordinates: what is a multiple of half a cell, but for the digits of a
 /// file, becomes one, so that the same grid in another format has the same bits. Throws BadInput where cells or their number make no sense.

@@ -256,7 +256,7 @@ Raster read_jpgis(const Path& path, const std::optional<Window>& window)
     const auto all = meshes(path);
     const scene::Grid whole = around(all);
     const Part part = part_of(whole, window, path.string());
-    Raster r{cut(whole, part), all[0].crs};
+    Raster r{crop(whole, part), all[0].crs};
     if (part.empty()) return r;
     for (const auto& m : all) {
         const auto column = std::llround((m.grid.x - r.grid.x) / whole.cell), row = std::llround((m.grid.y - r.grid.y) / whole.cell);

@@ -39,7 +39,7 @@ Part part_of(const scene::Grid& g, const std::optional<Window>& window, const st
     return p;
 }
 
-scene::Grid cut(const scene::Grid& whole, const Part& p)
+scene::Grid crop(const scene::Grid& whole, const Part& p)
 {
     if (p.empty()) return {whole.x, whole.y, whole.cell, 0, 0, {}};
     scene::Grid g{whole.x + p.column * whole.cell, whole.y + (whole.rows - p.end_row) * whole.cell, whole.cell, p.columns(), p.rows(), {}};

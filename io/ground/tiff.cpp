@@ -291,7 +291,7 @@ Raster read_tiff(const Path& path, const std::optional<Window>& window)
     const Tiff tiff = open(path);
     const Layout l = layout(tiff.get(), path);
     const Part part = part_of(l.info.grid, window, file);
-    Raster r{cut(l.info.grid, part), l.info.crs};
+    Raster r{crop(l.info.grid, part), l.info.crs};
     if (!part.empty()) Cells(tiff.get(), l, part, file, r.grid).read();
     return r;
 }

@@ -16,7 +16,7 @@ const double most_points = 1e11;
 
 } // namespace
 
-/// Cuts indices along x into runs that lie all inside or all outside: single points within the zones and at
+/// Splits indices along x into runs that lie all inside or all outside: single points within the zones and at
 /// their rims, whole stretches between them. Calls visit(first, last), inclusive.
 template <class Zones, class Visit> void Lattice::for_each_run(Range r, const Zones& zones, Visit visit) const
 {

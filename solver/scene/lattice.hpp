@@ -33,7 +33,7 @@ struct GridPart {
 inline constexpr double most_lines = 2e7;
 
 /// The lattice points that belong to one shape: n a side of a box from its lower corner; of other shapes those of the one lattice at
-/// (k + 1/2) spacings that holds() gives them, so that a cut or a shift by whole spacings neither loses nor moves a point. Order of
+/// (k + 1/2) spacings that holds() gives them, so that a division or a shift by whole spacings neither loses nor moves a point. Order of
 /// local ids: z slowest, then y, then x. Boxes keep three numbers; other shapes keep, for every line along x, the intervals inside.
 class Lattice {
 public:
@@ -86,7 +86,7 @@ private:
     template <class Zones, class Visit> void for_each_run(Range, const Zones&, Visit) const;
     void lay_box(const Box&);
     void lay_lines(const Shape&);
-    /// Cuts off the layers that lie outside along the axis of extrusion and tells along which axes lines repeat.
+    /// Drops the layers that lie outside along the axis of extrusion and tells along which axes lines repeat.
     void find_repetition(const Shape&);
     /// Appends the intervals of a line; points in it.
     std::int64_t add_line(const Shape&, std::int64_t ky, std::int64_t kz);

@@ -19,7 +19,7 @@ struct Accuracy {
     bool operator==(const Accuracy&) const = default;
 };
 
-enum class View { Oblique, Side, Top, Cut }; // Cut: a slice along x through the soil's middle, seen from the side
+enum class View { Oblique, Side, Top, Slice }; // Slice: along x through the soil's middle, seen from the side
 enum class Color { Displacement, Speed, PlasticStrain, Pressure };
 struct Picture {
     View view = View::Oblique;

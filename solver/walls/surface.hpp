@@ -1,6 +1,6 @@
 #pragma once
 // The walls of a scene as one surface: the boundary of the union of all their shapes and of their images across the periods. A
-// face that another wall covers or continues is no surface. How the same ground is cut or joined does not show.
+// face that another wall covers or continues is no surface. How the same ground is divided or joined does not show.
 #include "solver/scene/scene.hpp"
 #include <vector>
 

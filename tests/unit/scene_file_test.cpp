@@ -474,7 +474,7 @@ TEST(SceneKeys, WordsMeanTheirValues)
     EXPECT_EQ(with("accuracy.precision=double").accuracy.precision, scene::Precision::Double);
     EXPECT_EQ(with("accuracy.correction=gradient").accuracy.correction, scene::Correction::Gradient);
     EXPECT_EQ(with("wall.0.surface=smooth").walls[0].surface, scene::Surface::Smooth);
-    EXPECT_EQ(with("output.picture.view=cut").output.picture->view, scene::View::Cut);
+    EXPECT_EQ(with("output.picture.view=cut").output.picture->view, scene::View::Slice);
     EXPECT_EQ(with("output.picture.color=pressure").output.picture->color, scene::Color::Pressure);
     for (const auto& preset : io::presets()) EXPECT_EQ(with(("accuracy.preset=" + preset.name).c_str()).accuracy.preset, preset.value);
 }

@@ -21,7 +21,7 @@ enum class Status { NotRun, Finished, Failed, Refused, Stopped };
 const char* word(Part);
 const char* word(Status);
 
-/// The maps of a run, cut to where soil came.
+/// The maps of a run, cropped to where soil came.
 struct RunMaps {
     scene::MapGrid grid; // of all its cells, map coordinates
     std::int64_t column = 0, row = 0, columns = 0, rows = 0;

@@ -39,7 +39,7 @@ public:
 
     /// The words alone; rate in steps/s, left in s of wall time (negative: unknown).
     static std::string text(const Status&, double end, double rate, double left);
-    /// As many of the words as the columns hold, none of them cut.
+    /// As many of the words as the columns hold, none of them in part.
     static std::string shortened(const std::string& text, std::size_t columns);
 
 private:

@@ -348,7 +348,7 @@ private:
             const auto [results, scene] = open_results(comm_, run_of(t.name));
             auto task = picture_task(scene, results);
             task.color = "plastic_strain", task.range = {};
-            task.view = setting_.base.output.picture ? setting_.base.output.picture->view : scene::View::Cut; // it lies inside
+            task.view = setting_.base.output.picture ? setting_.base.output.picture->view : scene::View::Slice; // it lies inside
             task.at = HUGE_VAL;
             task.file = [&](int) { return io::Place(out_ / name); };
             for (const auto& w : io::draw_pictures(comm_, task).warnings) complain("warning: " + w);
