@@ -77,7 +77,7 @@ private:
     int index_of(int r);
     /// Whether a block touches one that this rank (by index) had at the start and still has.
     template <class Eligible> bool rooted(int b, int q, Eligible eligible) const;
-    /// Whether the rest of the own blocks hangs together as before without this one.
+    /// Whether the other own blocks hang together as before without this one.
     bool can_spare(int b);
 
     std::vector<Chosen> chosen_; // offered in this round, in order

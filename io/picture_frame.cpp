@@ -8,7 +8,7 @@ namespace kuzure::io {
 namespace {
 
 constexpr double outside_share = 0.005; // of the soil at either end of an axis: what may stay outside if it flies far
-constexpr double flies = 2;             // times the extent of the rest
+constexpr double flies = 2;             // times the extent of all others
 constexpr double stands_out = 1.3;      // times the range of the other 98 %
 
 double& axis(Vector& v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }

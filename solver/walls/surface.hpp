@@ -15,7 +15,7 @@ struct Face {
     /// Where it touches the surface, seen from the point x, m.
     Vector foot(Vector x) const { return x + depth * normal; }
 };
-/// What of a force on a face the wall of the face feels; the rest is felt by the wall of the point behind it, if that is another.
+/// What of a force on a face the wall of the face feels; the remainder is felt by the wall of the point behind it, if that is another.
 inline Vector own_share(const Face& f, Vector force) { return dot(f.side, f.normal) > 1 - 1e-9 ? force : dot(force, f.side) * f.side; }
 /// Velocity of a face from those of walls, velocity(wall, point); x: the point behind it, of the wall `own`. At an edge between two walls
 /// each counts the way in which it feels the force.

@@ -97,8 +97,8 @@ def foreign_through(path, includes, pattern, seen):
     for _, _, what in includes.get(path, []):
         if re.fullmatch(pattern, what):
             return [path, f"<{what}>"]
-        if what in includes and what not in seen and (rest := foreign_through(what, includes, pattern, seen)):
-            return [path, *rest]
+        if what in includes and what not in seen and (onward := foreign_through(what, includes, pattern, seen)):
+            return [path, *onward]
     return None
 
 

@@ -218,9 +218,9 @@ TEST(Fill, RoundShapesAreCountedExactly)
     // Centred on a lattice point, so that many points lie on the surface: whole numbers tell how many are inside, and half of those on
     // the surface count, for of two opposite ones the interior is on the greater side of one.
     const auto expected = [](std::int64_t r, int across) {
-        const auto inside = [r](std::int64_t rest) { // twice the whole x with x^2 < rest, once those with x^2 = rest
+        const auto inside = [r](std::int64_t most) { // twice the whole x with x^2 < most, once those with x^2 = most
             std::int64_t x = r, on = 0;
-            while (x >= 0 && x * x >= rest) on += x * x == rest ? (x > 0 ? 2 : 1) : 0, --x;
+            while (x >= 0 && x * x >= most) on += x * x == most ? (x > 0 ? 2 : 1) : 0, --x;
             return (x < 0 ? 0 : 2 * (2 * x + 1)) + on;
         };
         std::int64_t sum = 0;

@@ -138,7 +138,7 @@ std::vector<fs::path> corpus(const char* folder)
     return files;
 }
 
-/// The rest of the first line, behind a marker.
+/// What of the first line stands behind a marker.
 std::string first_line(const std::string& text, const std::string& marker)
 {
     EXPECT_TRUE(text.starts_with(marker)) << text.substr(0, 60);

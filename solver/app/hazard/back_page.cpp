@@ -46,7 +46,7 @@ public:
         s += verdict() + cards();
         s += section(id("curve").c_str(), t("The misfit", "不適合度"), curves());
         s += section(id("map").c_str(), t("The best run and the event", "最良の計算と実際の範囲"), map());
-        s += section(id("rests").c_str(), t("What it rests on", "この結果の前提"), rests());
+        s += section(id("rests").c_str(), t("What it rests on", "この結果の前提"), basis());
         s += section(id("runs").c_str(), t("The runs", "計算の一覧"), runs());
         return s + "</article>\n";
     }
@@ -139,7 +139,7 @@ private:
         return s;
     }
 
-    std::string rests() const
+    std::string basis() const
     {
         std::string rows;
         const auto row = [&](const std::string& name, const std::string& value) {
