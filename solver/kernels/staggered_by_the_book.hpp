@@ -165,7 +165,7 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
             else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)]))
                 same->wall = part.wall, same->side = on.normal;
         }
-    // Of equally near ones that which looks up, then along x, then y: the order of walls and faces does not show.
+    // Of equally near ones that which faces up, then along x, then y: the order of walls and faces does not show.
     std::ranges::sort(all, {}, [&](const Face& f) { return f.depth - least * dot(f.normal, {0.1, 0.01, 1}); });
     return all;
 }

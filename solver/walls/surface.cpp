@@ -168,7 +168,7 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
             },
             scene_.walls[part.wall].shape);
     }
-    // Of equally near ones that which looks up, then along x, then y: how the ground is drawn does not show.
+    // Of equally near ones that which faces up, then along x, then y: how the ground is drawn does not show.
     const auto rank = [&](const Face& f) { return f.depth - tolerance_ * dot(f.normal, {0.1, 0.01, 1}); };
     std::sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return rank(a) < rank(b); });
 }

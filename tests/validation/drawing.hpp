@@ -308,7 +308,7 @@ inline Generated generate(unsigned seed)
     const auto draw_all = [&](const auto& ground) {
         g.drawings.push_back({draw_ground(ground, draw, false)});
         g.drawings.push_back({draw_ground(ground, draw, true), {}, draw.between(0.05, 0.5), 0, "cut"});
-        // Of two faces that are equally near, as at a brick's edge, the one that looks up, then along x counts: such ground may be divided,
+        // Of two faces that are equally near, as at a brick's edge, the one that faces up, then along x counts: such ground may be divided,
         // but unless it is rough not turned, without a difference.
         const bool even = bricks && surface != 0, turned = g.dimensions == 3 && bricks && draw.chance(0.5);
         Drawing again{{}, {}, draw.between(0.05, 0.5), 0, "cut"};

@@ -79,7 +79,7 @@ public:
         constexpr double patience = 1000; // s: without a deadline; a run that is stopped gets some of it for its checkpoint
         queue_.emplace(
             base_, out_, within_ > 0 ? within_ : patience, [this] { return left(); }, [this] { return stop_->came(); },
-            [this] { look_at_new_ones(); });
+            [this] { compare_new_runs(); });
         if (within_ > 0 && !layers_.given && !fixed_spacing_) choose_layers();
         begin_runs();
 
@@ -238,7 +238,7 @@ private:
     {
         const int together = std::min<int>(jobs_, int(todo.size()));
         queue_->work(todo, jobs_, std::max(1, cores_ / together), within_ > 0 ? mean_seconds() : 0);
-        look_at_new_ones();
+        compare_new_runs();
         return std::ranges::all_of(todo, [](const Run* r) { return r->status != Status::NotRun && r->status != Status::Stopped; });
     }
     double mean_seconds() const
@@ -250,7 +250,7 @@ private:
         return n > 0 ? sum / n : 0;
     }
 
-    void look_at_new_ones()
+    void compare_new_runs()
     {
         for (auto* list : {&tried_, &twins_})
             for (auto& t : *list) {

@@ -104,7 +104,7 @@ Profile measure_profile(const Scene& s, const io::SoilSnapshot& soil, double win
         return double(whole) + (n * (x + half) - (sums[touched] - sums[whole])) / dx;
     };
 
-    // Beside a wall, where the soil has not moved outwards, the window must not look behind it.
+    // Beside a wall, where the soil has not moved outwards, the window must not reach behind it.
     const bool radial = p.spread == Spread::Radial;
     const bool stays_low = radial || along.front() - half > p.start_low - 0.25 * window;
     const bool stays_high = !radial && along.back() + half < p.start_high + 0.25 * window;
