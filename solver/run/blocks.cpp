@@ -188,16 +188,16 @@ struct BlockSoil::Sight {
 class BlockSoil::NearCounts {
 public:
     NearCounts(const BlockSoil& soil, const Block& b, double safe)
-        : soil_(soil), block_(b), reach2_(safe * safe), like_(soil.next_block_holds(safe) ? soil.pattern_key(b) : std::string())
+        : soil_(soil), block_(b), reach2_(safe * safe), pattern_(soil.next_block_holds(safe) ? soil.pattern_key(b) : std::string())
     {
     }
     std::int64_t near(std::span<const Sight> sights)
     {
         std::string key;
-        if (!like_.empty()) {
+        if (!pattern_.empty()) {
             std::uint32_t mask = 0;
             for (const Sight& s : sights) mask |= 1u << ((s.way[0] + 1) * 9 + (s.way[1] + 1) * 3 + s.way[2] + 1);
-            key = fmt::format("{}|{}", mask, like_);
+            key = fmt::format("{}|{}", mask, pattern_);
             const std::lock_guard lock(soil_.mutex_);
             if (const auto known = soil_.known_counts_.find(key); known != soil_.known_counts_.end()) return known->second;
         }
@@ -233,7 +233,7 @@ private:
     const BlockSoil& soil_;
     const Block& block_;
     double reach2_;
-    std::string like_; // blocks of this pattern have the same counts; empty where that is not so
+    std::string pattern_; // blocks of this pattern have the same counts; empty where that is not so
     std::vector<Vector> points_;
     std::map<Block, Bounds> boxes_; // by way
 };

@@ -27,7 +27,7 @@ constexpr double box_bytes = 48;         // of a rank's box, which every rank ge
 // Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
 constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
 constexpr double even_iterations = 55;  // numbers told to all peers, each with a sum over all ranks
-constexpr double even_rounds = 11;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
+constexpr double even_rounds = 11;      // of offers: offers, answers and updates, and a sum and a maximum over all ranks
 constexpr double even_moves = 0.105;    // particles that migrate, of a rank's
 constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which every rank gets
 constexpr double state_bytes = 252;     // of a particle that migrates
