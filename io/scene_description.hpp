@@ -551,9 +551,8 @@ template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
                a.text(p + ".points", v.points,
                       {.optional = true,
                        .example = "\"houses.csv\"",
-                       .doc = "named points (.csv with the columns name, x, y; .shp; GeoJSON) of which points.csv tells arrival, greatest "
-                              "thickness, "
-                              "speed and pressure"});
+                       .doc = "named points (.csv with the columns name, x, y; .shp; GeoJSON) of which points.csv tells arrival, "
+                              "greatest thickness, speed and pressure"});
            });
 }
 

@@ -49,8 +49,7 @@ struct StepInput {
     double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest
 };
 
-/// Where a wall stands at the start of a step, at its end and at that of the next, seen from where it stood when the model's walls were
-/// set.
+/// Where a wall stands at the start of a step, at its end and at that of the next, seen from its pose when the model's walls were set.
 struct WallPoses {
     scene::Pose before, after, later;
 };
@@ -88,7 +87,7 @@ struct WallStep {
 /// One stage of a step: a pass over all clusters, and the exchange of ghosts before it.
 struct Stage {
     const char* name;
-    std::size_t ghost_bytes; // of a ghost
+    std::size_t ghost_bytes; // of a ghost's record
     /// Floating-point operations of one directed pair (an fma counts two; square root, division, min and max one), and of
     /// the update of one particle; bytes of main memory that one particle's update moves: for the roofline.
     double flops_per_pair, flops_per_particle, bytes_per_particle;
@@ -128,8 +127,8 @@ public:
     virtual PassResult run(int stage, const StepInput&, std::span<const Index> clusters) = 0;
     /// After the last cluster of a stage.
     virtual void end_stage(int stage) = 0;
-    /// Ghosts of a stage, a record each: that of an owned particle seen from another period (m), and back to its slot. Threads call them at
-    /// once.
+    /// Ghosts of a stage, a record each: that of an owned particle seen from another period (m), and back to its slot.
+    /// Threads call them at once.
     virtual void pack(int stage, Index owned, Vector shift, std::byte* to) const = 0;
     virtual void unpack(int stage, Index slot, const std::byte* from) = 0;
 

@@ -55,8 +55,8 @@ struct MirrorImage {
     template <class V> KUZURE_INLINE V factor(V, V) const { return V(number<V>(2)); }
 };
 
-/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest. `motion`: of the faces, where walls
-/// move.
+/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
+/// `motion`: of the faces, where walls move.
 template <bool moving, class Law, class V, class T>
 KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceMotion<T>* motion)
 {

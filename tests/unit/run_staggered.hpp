@@ -12,8 +12,8 @@
 
 namespace kuzure::measured {
 
-/// Walls of a scene whose events move them, in a step of `wall_dt` before one of `wall_next`, s; a little way on, where all go the same
-/// way.
+/// Walls of a scene whose events move them, in a step of `wall_dt` before one of `wall_next`, s;
+/// a little way on, where all go the same way.
 constexpr double wall_dt = 0.02, wall_next = 0.03;
 inline std::vector<WallPoses> poses_of(const Scene& s)
 {
