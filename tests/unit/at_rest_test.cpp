@@ -143,7 +143,7 @@ TEST(AtRest, ReportedScenes)
 }
 
 // The same bank whole, split into polygons and into boxes: every point the same stress.
-TEST(AtRest, CutGroundHasTheStressOfTheWhole)
+TEST(AtRest, SplitGroundHasTheStressOfTheWhole)
 {
     const auto rectangle = [](double x1, double z1, double x2, double z2) { return Polygon{{{x1, z1}, {x2, z1}, {x2, z2}, {x1, z2}}, {}}; };
     const auto sorted = [](const Scene& s) {
