@@ -64,9 +64,8 @@ void check_loads(const Scene& s, Issues& issues)
                       "write normal = [0.0, 0.0, 1.0]");
         if (l.normal && *l.normal == Vector{}) error(".normal", "expected a direction, found [0, 0, 0]; upward: [0.0, 0.0, 1.0]");
         if (l.follow && (l.traction || l.normal))
-            error(".follow",
-                  "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; leave "
-                  "one out");
+            error(".follow", "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; "
+                             "leave one out");
         if (s.dimensions == 2 && ((l.traction && l.traction->y != 0) || (l.normal && l.normal->y != 0)))
             error("", "expected no traction and no normal along y in two dimensions, found some; write 0.0");
         if (!l.body.empty() && body_named(s, l.body) < 0)
