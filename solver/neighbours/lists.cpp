@@ -1,5 +1,6 @@
 #include "solver/neighbours/lists.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/core/simd.hpp"
 #include <algorithm>
 #include <bit>
 #include <limits>

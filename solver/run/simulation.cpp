@@ -1,4 +1,5 @@
 #include "solver/run/simulation.hpp"
+#include "solver/core/simd.hpp"
 #include "solver/run/loads.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/loads.hpp"
