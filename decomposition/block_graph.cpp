@@ -32,7 +32,7 @@ void append_links(const BlockGraph& g, const BlockIndex& index, int b, std::vect
         }
         there = wrapped(there, g.grid.period);
         const int n = within_limit(there) ? index[there] : -1;
-        if (n >= 0) to.push_back({n, d, share * g.grid.row_bytes * (g.particles[b] + g.particles[n])});
+        if (n >= 0) to.push_back({n, d, share * g.grid.ghost_bytes * (g.particles[b] + g.particles[n])});
     }
 }
 
@@ -168,10 +168,10 @@ CutReport describe(const BlockGraph& g, std::span<const int> part, int parts)
         for (std::size_t from = 0, to; from < requests.size(); from = to) {
             to = from;
             while (to < requests.size() && requests[to].part == requests[from].part && requests[to].image == requests[from].image) ++to;
-            const double rows = shares.of(std::span(requests).subspan(from, to - from)) * g.particles[b];
-            r.ghosts[requests[from].part] += rows;
+            const double ghosts = shares.of(std::span(requests).subspan(from, to - from)) * g.particles[b];
+            r.ghosts[requests[from].part] += ghosts;
             if (requests[from].part == part[b]) continue;
-            r.cut_bytes += rows * g.grid.row_bytes;
+            r.cut_bytes += ghosts * g.grid.ghost_bytes;
             sends[part[b]].push_back(requests[from].part);
         }
     }

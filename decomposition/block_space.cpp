@@ -48,11 +48,11 @@ Block BlockSpace::block_of(Vector x) const
     return wrapped(b);
 }
 
-BlockGrid BlockSpace::grid(double reach, double row_bytes) const
+BlockGrid BlockSpace::grid(double reach, double ghost_bytes) const
 {
     BlockGrid g;
     g.period = period_;
-    g.row_bytes = row_bytes;
+    g.ghost_bytes = ghost_bytes;
     if (reach > 0)
         for (int a = 0; a < 3; ++a) g.reach[a] = reach / size_[a];
     return g;

@@ -31,8 +31,8 @@ public:
     const std::array<std::int32_t, 3>& period() const { return period_; }
     const std::array<double, 3>& period_low() const { return period_low_; }
     const std::array<double, 3>& period_length() const { return period_length_; }
-    /// The grid that a cut looks at, for a halo of this reach (m; 0: a quarter of a block) and rows of so many bytes.
-    BlockGrid grid(double reach, double row_bytes) const;
+    /// The grid that a cut looks at, for a halo of this reach (m; 0: a quarter of a block) and ghosts of so many bytes.
+    BlockGrid grid(double reach, double ghost_bytes) const;
 
 private:
     std::array<double, 3> origin_, size_, period_low_, period_length_;

@@ -149,7 +149,7 @@ private:
 
     std::unique_ptr<Handle> handle_; // none without MPI
     int rank_ = 0, size_ = 1;
-    mutable int round_ = 0; // exchanges so far: two in a row use different tags
+    mutable int round_ = 0; // exchanges so far: two that follow each other use different tags
 };
 
 } // namespace kuzure

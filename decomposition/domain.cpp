@@ -63,7 +63,7 @@ CutReport Domain::cut(std::span<const BlockWork> mine, Method method, HaloCost h
                 lister.resize(at + n, r);
             }
             if (labels == Labels::Free) lister.clear();
-            const auto [g, owner, r] = cut_blocks(all, lister, space_.grid(halo.reach, halo.row_bytes), comm_.size(), method);
+            const auto [g, owner, r] = cut_blocks(all, lister, space_.grid(halo.reach, halo.ghost_bytes), comm_.size(), method);
             put(result, std::span<const char>());
             put(result, std::span<const Block>(g.block));
             put(result, std::span<const int>(owner));
@@ -111,7 +111,7 @@ EvenReport Domain::even_out(std::span<const BlockWork> mine, HaloCost halo)
 {
     ensure(is_cut_, "a domain is evened out before it is cut");
     std::vector<BlockOwners> known{known_};
-    const auto r = kuzure::even_out(RunRanks(comm_), {{mine.begin(), mine.end()}}, space_.grid(halo.reach, halo.row_bytes), known);
+    const auto r = kuzure::even_out(RunRanks(comm_), {{mine.begin(), mine.end()}}, space_.grid(halo.reach, halo.ghost_bytes), known);
     known_ = std::move(known[0]);
     return r;
 }

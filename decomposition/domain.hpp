@@ -13,7 +13,7 @@ namespace kuzure {
 /// How a cut weighs the halo: its reach in m (0: a quarter of a block) and the bytes of a ghost's record.
 struct HaloCost {
     double reach = 0;
-    double row_bytes = 128;
+    double ghost_bytes = 128;
 };
 
 /// Whether a cut leaves a part's work with the rank that holds it, or no rank holds any yet.

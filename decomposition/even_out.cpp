@@ -46,7 +46,7 @@ struct Part {
     std::vector<MessageOf<Offer>> offers(bool flowing, double mean);
     std::vector<MessageOf<int>> answer(const std::vector<MessageOf<Offer>>&);
     std::vector<MessageOf<Moved>> commit(const std::vector<MessageOf<int>>& taken);
-    void learn(const std::vector<MessageOf<Moved>>&);
+    void apply(const std::vector<MessageOf<Moved>>&);
     double halo() const;
     BlockOwners table() const;
 
@@ -77,7 +77,7 @@ private:
     int index_of(int r);
     /// Whether a block touches one that this rank (by index) had at the start and still has.
     template <class Eligible> bool rooted(int b, int q, Eligible eligible) const;
-    /// Whether the rest of the own blocks hangs together as before without this one.
+    /// Whether the other own blocks hang together as before without this one.
     bool can_spare(int b);
 
     std::vector<Chosen> chosen_; // offered in this round, in order
@@ -235,7 +235,7 @@ std::vector<MessageOf<Moved>> Part::commit(const std::vector<MessageOf<int>>& ta
 {
     std::map<int, int> left; // that may still go, by receiver
     for (const auto& p : taken) left[index_of_rank.at(p.rank)] = p.items.front();
-    std::map<int, std::vector<Moved>> news;
+    std::map<int, std::vector<Moved>> updates;
     for (const Chosen& c : chosen_) {
         offered_[c.block] = 0;
         int& n = left[c.to];
@@ -257,16 +257,16 @@ std::vector<MessageOf<Moved>> Part::commit(const std::vector<MessageOf<int>>& ta
         std::ranges::sort(who);
         who.erase(std::unique(who.begin(), who.end()), who.end());
         for (const int q : who)
-            if (q != 0) news[ranks[q]].push_back(moved);
+            if (q != 0) updates[ranks[q]].push_back(moved);
     }
     std::vector<MessageOf<Moved>> out;
-    for (auto& [r, items] : news) out.push_back({r, std::move(items)});
+    for (auto& [r, items] : updates) out.push_back({r, std::move(items)});
     return out;
 }
 
-void Part::learn(const std::vector<MessageOf<Moved>>& news)
+void Part::apply(const std::vector<MessageOf<Moved>>& updates)
 {
-    for (const auto& p : news)
+    for (const auto& p : updates)
         for (const Moved& m : p.items) {
             const int b = index[m.block];
             if (b < 0) continue;
@@ -436,14 +436,14 @@ bool DiffusiveBalancer::round(bool flowing)
     const auto answers = group_.exchange(each([&](Part& p) { return p.answer(offers[k++]); }));
     k = 0;
     std::int64_t given = 0;
-    const auto news = group_.exchange(each([&](Part& p) {
+    const auto updates = group_.exchange(each([&](Part& p) {
         const auto before = p.given;
         auto out = p.commit(answers[k++]);
         given += p.given - before;
         return out;
     }));
     k = 0;
-    each([&](Part& p) { return p.learn(news[k++]), 0; });
+    each([&](Part& p) { return p.apply(updates[k++]), 0; });
     double moved = double(given);
     group_.sum(std::span(&moved, 1));
     report_.moved += std::int64_t(moved);
@@ -456,7 +456,7 @@ EvenReport DiffusiveBalancer::run()
     double sums[3] = {0, 0, 0};
     for (const Part& p : parts_) {
         sums[0] += p.work, sums[1] += p.blocks;
-        for (const int b : p.home) sums[2] += p.g.particles[b] * p.g.grid.row_bytes;
+        for (const int b : p.home) sums[2] += p.g.particles[b] * p.g.grid.ghost_bytes;
     }
     group_.sum(sums);
     mean_ = report_.mean = sums[0] / group_.size();

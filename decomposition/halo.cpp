@@ -11,7 +11,7 @@ using mpi::check;
 struct Halo::Impl {
     const Comm& comm;
     HaloPlan plan;
-    std::vector<mpi::Type> row; // of each channel
+    std::vector<mpi::Type> record; // of each channel
     Array<std::byte> outgoing, arrivals;
     Index n_ghosts = 0;
     // Of each channel, one request per peer over MPI: first the receives, then the sends. Own images have none.
@@ -52,7 +52,7 @@ Halo& Halo::operator=(Halo&& other) noexcept
     channels_ = std::move(other.channels_);
     current_ = other.current_;
     slot_ = std::move(other.slot_);
-    rows_ = other.rows_;
+    records_ = other.records_;
     refreshes_ = other.refreshes_;
     messages_ = other.messages_;
     return *this;
@@ -63,46 +63,48 @@ Halo::~Halo()
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
 }
 
-/// Persistent messages for rows of so many bytes, in the order of `counts`, what comes from each rank.
+/// Persistent messages for records of so many bytes, in the order of `counts`, what comes from each rank.
 Halo::Channel Halo::open_channel(std::size_t bytes, const std::vector<MessageOf<std::int64_t>>& counts)
 {
     Impl& m = *impl_;
     const Comm& comm = m.comm;
     const MPI_Comm mpi_comm = comm.native() ? *static_cast<const MPI_Comm*>(comm.native()) : MPI_COMM_NULL; // none without MPI
     Channel channel{bytes, {}, {}};
-    m.row.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
+    m.record.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
     auto& requests = m.channels.emplace_back();
     Index first = 0;
     for (const auto& c : counts) {
         const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * bytes};
         if (c.rank != comm.rank()) {
             requests.push_back(MPI_REQUEST_NULL);
-            check(MPI_Recv_init(in.rows, in.n, m.row.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
+            check(MPI_Recv_init(in.records, in.n, m.record.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
         }
         channel.in.push_back(in);
         first += in.n;
     }
-    std::byte* rows = m.outgoing.data();
+    std::byte* next = m.outgoing.data();
     for (const auto& p : m.plan.peers) {
         if (p.sends.empty()) continue;
-        Out out{p.sends.data(), Index(p.sends.size()), rows};
+        Out out{p.sends.data(), Index(p.sends.size()), next};
         if (p.rank == comm.rank()) {
-            out.rows = channel.in[m.self].rows;
+            out.records = channel.in[m.self].records;
         } else {
-            rows += std::size_t(out.n) * bytes;
+            next += std::size_t(out.n) * bytes;
             requests.push_back(MPI_REQUEST_NULL);
-            check(MPI_Send_init(out.rows, out.n, m.row.back().type, p.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Send_init");
+            check(MPI_Send_init(out.records, out.n, m.record.back().type, p.rank, mpi::Refresh, mpi_comm, &requests.back()),
+                  "MPI_Send_init");
         }
         channel.out.push_back(out);
     }
     return channel;
 }
 
-Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_bytes) : impl_(std::make_unique<Impl>(comm, std::move(plan)))
+Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> record_bytes)
+    : impl_(std::make_unique<Impl>(comm, std::move(plan)))
 {
-    ensure(!row_bytes.empty() && std::ranges::min(row_bytes) > 0, "a halo's rows have at least one byte");
+    ensure(!record_bytes.empty() && std::ranges::min(record_bytes) > 0, "a halo's records have at least one byte");
     Impl& m = *impl_;
-    const std::size_t longest = std::ranges::max(row_bytes);
+    const std::size_t longest = std::ranges::max(record_bytes);
 
     std::vector<MessageOf<std::int64_t>> counts;
     std::int64_t n_in = 0;
@@ -110,13 +112,13 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
         const auto n = std::int64_t(p.sends.size());
         if (n == 0) continue;
         counts.push_back({p.rank, {n}});
-        if (p.rank != comm.rank()) rows_ += n, ++messages_;
+        if (p.rank != comm.rank()) records_ += n, ++messages_;
     }
     counts = comm.exchange(counts);
     for (const auto& c : counts) n_in += c.items.at(0);
-    ensure(n_in <= std::numeric_limits<Index>::max() && rows_ <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
+    ensure(n_in <= std::numeric_limits<Index>::max() && records_ <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
     m.n_ghosts = Index(n_in);
-    m.outgoing.resize(std::size_t(rows_) * longest);
+    m.outgoing.resize(std::size_t(records_) * longest);
     m.arrivals.resize(std::size_t(n_in) * longest);
     for (const auto& c : counts) {
         if (c.rank == comm.rank()) m.self = int(&c - counts.data());
@@ -127,8 +129,8 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> row_byt
     for (const auto& p : m.plan.peers)
         if (!p.sends.empty()) m.send_of_out.push_back(p.rank == comm.rank() ? -1 : n_requests++);
 
-    for (const std::size_t bytes : row_bytes) {
-        if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.row_bytes == bytes; })) continue;
+    for (const std::size_t bytes : record_bytes) {
+        if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.record_bytes == bytes; })) continue;
         channels_.push_back(open_channel(bytes, counts));
     }
     m.finished.resize(std::size_t(n_requests));
@@ -154,18 +156,18 @@ std::vector<Ghost> Halo::ghosts(const Particles& p) const
     });
 }
 
-void Halo::place(std::span<const Index> slot)
+void Halo::assign_slots(std::span<const Index> slot)
 {
     ensure(slot.size() == slot_.size(), "a halo needs one slot per ghost");
     slot_.assign(slot.begin(), slot.end());
 }
 
-void Halo::start_receives(std::size_t row_bytes)
+void Halo::start_receives(std::size_t record_bytes)
 {
     Impl& m = *impl_;
     ensure(!m.in_flight, "a refresh begins while another is under way");
-    const auto channel = std::ranges::find(channels_, row_bytes, &Channel::row_bytes);
-    ensure(channel != channels_.end(), "a refresh has rows of a size that its halo was not made for");
+    const auto channel = std::ranges::find(channels_, record_bytes, &Channel::record_bytes);
+    ensure(channel != channels_.end(), "a refresh has records of a size that its halo was not made for");
     current_ = std::size_t(channel - channels_.begin());
     m.in_flight = true;
     m.outstanding = m.n_receives;

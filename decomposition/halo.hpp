@@ -23,109 +23,109 @@ struct HaloPlan {
     std::array<Vector, 27> shift{}; // added to the owner's position, m
 };
 
-/// What the solver must know to put a ghost in its place: one row of Halo::ghosts().
+/// What the solver must know to sort a ghost in: one of Halo::ghosts().
 struct Ghost {
     Vector sorted_position; // shifted, m
     std::int64_t id;
     std::int32_t soil;
 };
 
-/// The exchange of one plan. Rows arrive by sending rank, those of one rank in its plan's order. Main thread only.
+/// The exchange of one plan. Records arrive by sending rank, those of one rank in its plan's order. Main thread only.
 class Halo {
 public:
-    /// Collective. The plan's counts are exchanged; rows of a refresh have one of these sizes, packed without gaps.
-    Halo(const Comm&, HaloPlan, std::span<const std::size_t> row_bytes);
-    Halo(const Comm& comm, HaloPlan plan, std::size_t row_bytes) : Halo(comm, std::move(plan), std::span(&row_bytes, 1)) {}
+    /// Collective. The plan's counts are exchanged; records of a refresh have one of these sizes, packed without gaps.
+    Halo(const Comm&, HaloPlan, std::span<const std::size_t> record_bytes);
+    Halo(const Comm& comm, HaloPlan plan, std::size_t record_bytes) : Halo(comm, std::move(plan), std::span(&record_bytes, 1)) {}
     Halo(Halo&&) noexcept;
     Halo& operator=(Halo&&) noexcept;
     ~Halo();
 
-    /// Rows that arrive in each refresh, own images included.
+    /// Records that arrive in each refresh, own images included.
     Index n_ghosts() const;
     const HaloPlan& plan() const;
 
-    /// One Row per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Row. Collective.
-    template <class Row, class Make> std::vector<Row> collect(Make make) const
+    /// One Record per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Record. Collective.
+    template <class Record, class Make> std::vector<Record> collect(Make make) const
     {
-        static_assert(std::is_trivially_copyable_v<Row>);
-        std::vector<MessageOf<Row>> out;
+        static_assert(std::is_trivially_copyable_v<Record>);
+        std::vector<MessageOf<Record>> out;
         for (const auto& peer : plan().peers) {
-            MessageOf<Row> p{peer.rank, {}};
+            MessageOf<Record> p{peer.rank, {}};
             p.items.reserve(peer.sends.size());
             for (const auto& s : peer.sends) p.items.push_back(make(s.owned, plan().shift[s.shift]));
             if (!p.items.empty()) out.push_back(std::move(p));
         }
-        std::vector<Row> rows;
-        for (const auto& p : comm().exchange(out)) rows.insert(rows.end(), p.items.begin(), p.items.end());
-        ensure(rows.size() == std::size_t(n_ghosts()), "a halo delivers another number of ghosts than planned");
-        return rows;
+        std::vector<Record> all;
+        for (const auto& p : comm().exchange(out)) all.insert(all.end(), p.items.begin(), p.items.end());
+        ensure(all.size() == std::size_t(n_ghosts()), "a halo delivers another number of ghosts than planned");
+        return all;
     }
     /// Where each ghost was sorted (shifted), its id and soil (0 where the store has no soil column). Collective.
     std::vector<Ghost> ghosts(const Particles&) const;
 
-    /// Row k of an arrival goes to slot[k] from now on; the identity before the first call.
-    void place(std::span<const Index> slot);
+    /// Record k of an arrival goes to slot[k] from now on; the identity before the first call.
+    void assign_slots(std::span<const Index> slot);
 
-    /// Starts a refresh of rows of one of the sizes: copy(Index owned, Vector shift, std::byte* to) writes one row; threads
+    /// Starts a refresh of records of one of the sizes: copy(Index owned, Vector shift, std::byte* to) writes one record; threads
     /// call it at once.
-    template <class Copy> void begin(std::size_t row_bytes, Copy copy)
+    template <class Copy> void begin(std::size_t record_bytes, Copy copy)
     {
-        start_receives(row_bytes);
+        start_receives(record_bytes);
         for (int peer = 0; peer < n_out(); ++peer) {
             const Out out = now().out[peer];
-            const std::size_t bytes = row_bytes;
+            const std::size_t bytes = record_bytes;
             const auto& shift = plan().shift;
-#pragma omp parallel for schedule(static) if (out.n > parallel_rows)
-            for (Index k = 0; k < out.n; ++k) copy(out.sends[k].owned, shift[out.sends[k].shift], out.rows + std::size_t(k) * bytes);
+#pragma omp parallel for schedule(static) if (out.n > parallel_records)
+            for (Index k = 0; k < out.n; ++k) copy(out.sends[k].owned, shift[out.sends[k].shift], out.records + std::size_t(k) * bytes);
             start_send(peer);
         }
     }
     /// The same of the first size.
-    template <class Copy> void begin(Copy copy) { begin(channels_.front().row_bytes, copy); }
+    template <class Copy> void begin(Copy copy) { begin(channels_.front().record_bytes, copy); }
     /// Lets MPI move what is under way; call it between chunks of work.
     void progress();
-    /// Ends the refresh: waits, and hands over each row by put(Index slot, const std::byte* row); threads
+    /// Ends the refresh: waits, and hands over each record by put(Index slot, const std::byte* record); threads
     /// call it at once. Throws Broken without a begin().
     template <class Put> void arrive(Put put)
     {
         for (int peer; (peer = next_arrival()) >= 0;) {
             const In in = now().in[peer];
-            const std::size_t bytes = now().row_bytes;
+            const std::size_t bytes = now().record_bytes;
             const Index* slot = slot_.data() + in.first;
-#pragma omp parallel for schedule(static) if (in.n > parallel_rows)
-            for (Index k = 0; k < in.n; ++k) put(slot[k], static_cast<const std::byte*>(in.rows) + std::size_t(k) * bytes);
+#pragma omp parallel for schedule(static) if (in.n > parallel_records)
+            for (Index k = 0; k < in.n; ++k) put(slot[k], static_cast<const std::byte*>(in.records) + std::size_t(k) * bytes);
         }
         finish();
     }
 
-    /// This rank's sends over MPI in one refresh: rows, and bytes of the first size.
-    std::int64_t rows_per_refresh() const { return rows_; }
-    std::int64_t bytes_per_refresh() const { return rows_ * std::int64_t(channels_.front().row_bytes); }
+    /// This rank's sends over MPI in one refresh: records, and bytes of the first size.
+    std::int64_t records_per_refresh() const { return records_; }
+    std::int64_t bytes_per_refresh() const { return records_ * std::int64_t(channels_.front().record_bytes); }
     int messages_per_refresh() const { return messages_; }
     std::int64_t refreshes() const { return refreshes_; }
 
 private:
-    static constexpr Index parallel_rows = 2048;
+    static constexpr Index parallel_records = 2048;
     struct Out {
         const HaloPlan::Send* sends;
         Index n;
-        std::byte* rows; // for own images, straight into the arrivals
+        std::byte* records; // for own images, straight into the arrivals
     };
     struct In {
         Index first, n;
-        std::byte* rows;
+        std::byte* records;
     };
-    /// Buffers' places for rows of one size.
+    /// Buffers for records of one size.
     struct Channel {
-        std::size_t row_bytes;
+        std::size_t record_bytes;
         std::vector<Out> out;
         std::vector<In> in;
     };
     const Comm& comm() const;
     const Channel& now() const { return channels_[current_]; }
     int n_out() const { return int(channels_.front().out.size()); }
-    Channel open_channel(std::size_t row_bytes, const std::vector<MessageOf<std::int64_t>>& counts);
-    void start_receives(std::size_t row_bytes);
+    Channel open_channel(std::size_t record_bytes, const std::vector<MessageOf<std::int64_t>>& counts);
+    void start_receives(std::size_t record_bytes);
     void start_send(int peer);
     int next_arrival();
     void finish();
@@ -135,7 +135,7 @@ private:
     std::vector<Channel> channels_;
     std::size_t current_ = 0; // channel of the refresh under way
     std::vector<Index> slot_;
-    std::int64_t rows_ = 0, refreshes_ = 0;
+    std::int64_t records_ = 0, refreshes_ = 0;
     int messages_ = 0;
 };
 

@@ -73,7 +73,7 @@ struct BlockWork {
 struct BlockGrid {
     std::array<std::int32_t, 3> period{0, 0, 0};
     std::array<double, 3> reach{0.25, 0.25, 0.25};
-    double row_bytes = 128;
+    double ghost_bytes = 128;
 };
 
 /// The occupied blocks, in lexicographic order, and their links to the 26 around them (across periodic axes too).

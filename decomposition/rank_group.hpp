@@ -81,10 +81,10 @@ public:
     std::vector<std::vector<double>> exchange_scalar(const std::vector<std::vector<int>>& peers,
                                                      std::span<const double> mine) const override
     {
-        std::vector<std::vector<double>> heard(peers.size());
+        std::vector<std::vector<double>> received(peers.size());
         for (std::size_t k = 0; k < peers.size(); ++k)
-            for (const int p : peers[k]) heard[k].push_back(mine[p]);
-        return heard;
+            for (const int p : peers[k]) received[k].push_back(mine[p]);
+        return received;
     }
     void sum(std::span<double>) const override {}
     void max(std::span<double>) const override {}

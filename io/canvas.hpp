@@ -38,7 +38,7 @@ public:
     std::uint32_t* row(int y) { return &pixels_[std::size_t(y) * std::size_t(width_)]; }
     const std::uint32_t* row(int y) const { return &pixels_[std::size_t(y) * std::size_t(width_)]; }
 
-    /// Pixels; parts outside the canvas are cut off.
+    /// Pixels; parts outside the canvas are clipped.
     void rectangle(double x, double y, double width, double height, Rgb);
     void line(double x0, double y0, double x1, double y1, double thickness, Rgb);
     void ring(double x, double y, double radius, double thickness, Rgb);

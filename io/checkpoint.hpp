@@ -41,7 +41,7 @@ Place write_checkpoint(const Team&, const Place& directory, const Particles&, co
                        std::span<const CheckpointTable> tables = {});
 
 /// Collective. Replaces the particles: each rank gets a contiguous share of the rows as written, with the
-/// fields of the file. Refuses by IoFailed, on all ranks, what is damaged, cut short, of another format, or
+/// fields of the file. Refuses by IoFailed, on all ranks, what is damaged, truncated, of another format, or
 /// lacks a field that the particles already carry; they are then left empty.
 Checkpoint read_checkpoint(const Team&, const Place& file, Particles&);
 /// The same of the very file that was verified.

@@ -1,5 +1,5 @@
 #pragma once
-// A TOML file checked by a table of keys: the place of every key for messages, --set, unknown and misspelt keys, defaults.
+// A TOML file checked by a table of keys: the line of every key for messages, --set, unknown and misspelt keys, defaults.
 // For files of io/ alone: it brings toml++.
 #include "io/keys.hpp"
 #include "solver/core/ensure.hpp"
@@ -63,7 +63,7 @@ public:
 private:
     struct Problem {
         std::size_t line; // 0: from a --set
-        std::string text; // with place and key
+        std::string text; // with line and key
     };
     bool has_enough() const;
     std::size_t line_of(const std::string& path) const;

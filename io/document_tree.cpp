@@ -1,4 +1,4 @@
-// The file as a tree: its bytes, the place of every key, --set. What its values must be: document.cpp.
+// The file as a tree: its bytes, the line of every key, --set. What its values must be: document.cpp.
 #include "io/document.hpp"
 #include "io/quote.hpp"
 #include "solver/core/ensure.hpp"
@@ -84,7 +84,7 @@ template <class Where> void refuse_deep_keys(std::string_view text, Where where)
 bool is_number(const toml::node* node) { return node && (node->is_integer() || node->is_floating_point()); }
 double number_of(const toml::node& node) { return node.is_integer() ? double(node.as_integer()->get()) : node.as_floating_point()->get(); }
 
-// ---- the file as a tree, with the place of every key ----
+// ---- the file as a tree, with the line of every key ----
 
 Document::Document(std::string_view text, std::string name, const KeyTable& keys, std::span<const std::string> sets)
     : name_(std::move(name)), keys_(keys)

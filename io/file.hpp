@@ -113,7 +113,7 @@ void write_lightly(const Place&, std::string_view content);
 /// The whole file, at most `limit` bytes. Throws IoFailed.
 std::string read_text(const Place&, std::uint64_t limit = std::uint64_t(1) << 30);
 
-/// All bytes to a place in an open file; 0 or the errno.
+/// All bytes to an offset in an open file; 0 or the errno.
 int write_all(int descriptor, const void* bytes, std::size_t count, std::int64_t at);
 
 /// Wait until a directory's names are on the disk. Throws IoFailed.

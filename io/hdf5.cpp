@@ -196,7 +196,7 @@ void H5Writer::write(const std::string& name, Number number, const void* rows, s
     }
     team_.broadcast(std::as_writable_bytes(std::span(&start, 1)));
     if (start < 0) agree(team_, complaint_);
-    if (!complaint_.empty()) return; // all hear of it in finish()
+    if (!complaint_.empty()) return; // all ranks get it in finish()
 
     if (const int error = write_all(descriptor_, rows, count * row, start + first * std::int64_t(row)))
         complaint_ = fmt::format("{}: writing table {} failed: {}", file_.string(), name, cause(file_, error));

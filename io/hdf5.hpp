@@ -1,5 +1,5 @@
 #pragma once
-// HDF5 as the rest of io/ needs it: tables of rows written by all ranks together and read by one at a time,
+// HDF5 as the other files of io/ need it: tables of rows written by all ranks together and read by one at a time,
 // every failure an IoFailed in words. No HDF5 type shows here, and the library never prints.
 #include "io/file.hpp"
 #include <map>

@@ -13,7 +13,7 @@ namespace kuzure::io {
 
 std::uint64_t HdfDisk::end()
 {
-    if (cut_ || !written_.empty()) return end_;
+    if (truncated_ || !written_.empty()) return end_;
     struct stat info;
     return ::fstat(descriptor_, &info) == 0 ? std::uint64_t(info.st_size) : 0;
 }

@@ -23,16 +23,16 @@ public:
 
     // The driver's side.
     std::uint64_t end();
-    void set_end(std::uint64_t end) { end_ = end, cut_ = true; }
+    void set_end(std::uint64_t end) { end_ = end, truncated_ = true; }
     bool read(std::uint64_t at, std::size_t count, void* into);
     void write(std::uint64_t at, std::size_t count, const void* from);
     FileIdentity identity() const;
 
 private:
     int descriptor_, error_ = 0;
-    bool cut_ = false;                                        // end_ counts, not the file's own length
+    bool truncated_ = false;                                  // end_ counts, not the file's own length
     std::uint64_t end_ = 0;                                   // while writing
-    std::map<std::uint64_t, std::vector<std::byte>> written_; // by place; pieces neither overlap nor touch
+    std::map<std::uint64_t, std::vector<std::byte>> written_; // by offset; pieces neither overlap nor touch
 };
 
 /// The HDF5 library from here on reports to us and not to the terminal, and does no clean-up when the program or MPI ends: every file is

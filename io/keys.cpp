@@ -148,7 +148,7 @@ std::string nearest(std::string_view written, const std::vector<std::string>& kn
     for (const auto& candidate : known) {
         const std::string other = lower(candidate);
         double distance = edit_distance(word, other);
-        // A part of a name, such as "friction" or "oakforest", is like it however long the rest.
+        // A part of a name, such as "friction" or "oakforest", is like it however long the whole.
         const auto &shorter = word.size() < other.size() ? word : other, &longer = word.size() < other.size() ? other : word;
         const bool part = shorter.size() >= 4 && longer.find(shorter) != longer.npos;
         // Two letters of five may be wrong, one of three or four; of one or two none.

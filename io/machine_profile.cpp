@@ -156,13 +156,13 @@ MachineProfile read_machine_profile(const std::string& name_or_path, const std::
 {
     if (name_or_path.find('/') != name_or_path.npos || name_or_path.ends_with(".toml"))
         return parse_machine_profile(read_document_text(name_or_path, machine_keys().file()), name_or_path, folders);
-    std::vector<std::string> known, places;
+    std::vector<std::string> known, searched;
     std::error_code error;
     for (const auto& folder : folders) {
         const auto file = folder / (name_or_path + ".toml");
         if (std::filesystem::exists(file, error))
             return parse_machine_profile(read_document_text(file, machine_keys().file()), file, folders);
-        places.push_back(folder.string());
+        searched.push_back(folder.string());
         for (const auto& entry : std::filesystem::directory_iterator(folder, error))
             if (entry.path().extension() == ".toml") known.push_back(entry.path().stem().string());
     }
@@ -170,10 +170,10 @@ MachineProfile read_machine_profile(const std::string& name_or_path, const std::
     known.erase(std::unique(known.begin(), known.end()), known.end());
     throw BadInput(known.empty()
                        ? fmt::format("--machine {}: expected a machine profile, found none in {}; give the path of a .toml file",
-                                     name_or_path, fmt::join(places, ", "))
+                                     name_or_path, fmt::join(searched, ", "))
                        : fmt::format("--machine {}: expected a machine profile, found none of this name in {}{} Known: {}; or give the "
                                      "path of a .toml file",
-                                     name_or_path, fmt::join(places, ", "), did_you_mean(name_or_path, known), fmt::join(known, ", ")));
+                                     name_or_path, fmt::join(searched, ", "), did_you_mean(name_or_path, known), fmt::join(known, ", ")));
 }
 
 } // namespace kuzure::io

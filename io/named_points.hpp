@@ -1,5 +1,5 @@
 #pragma once
-// Places with names, from a table a user wrote: houses, gauges, a road's kilometres.
+// Points with names, from a table a user wrote: houses, gauges, a road's kilometres.
 #include "io/ground/vectors.hpp"
 
 namespace kuzure::io {

@@ -97,7 +97,7 @@ struct Found {
 std::optional<Found> find(const Place& file)
 {
     for (int tries = 0;; ++tries) {
-        // Opened anew at each look: that is what makes network file systems ask their server.
+        // Opened anew at each poll: that is what makes network file systems ask their server.
         const Descriptor in = open_file(file, O_RDONLY | O_NONBLOCK);
         if (in < 0 && errno == ENOENT) return {};
         struct stat info;
@@ -263,7 +263,7 @@ Ownership::Ownership(const Place& directory, const std::function<void(const std:
     me.directory = identity(directory).number;
     mine_ = text_of(me);
     bool said = false;
-    const auto look_again = std::chrono::milliseconds(500);
+    const auto poll_interval = std::chrono::milliseconds(500);
     std::optional<double> first_beat;
     for (;;) {
         std::optional<Found> found;
@@ -290,7 +290,7 @@ Ownership::Ownership(const Place& directory, const std::function<void(const std:
             say(fmt::format("{}: {} wrote into this directory; waiting up to {} s for a sign that it still lives", directory.string(),
                             found->owner ? found->owner->words() : "somebody", dead_after_seconds));
         said = true;
-        std::this_thread::sleep_for(look_again);
+        std::this_thread::sleep_for(poll_interval);
     }
     heart_ = std::make_unique<Heart>(*this);
 }

@@ -37,7 +37,7 @@ public:
     /// Looks anew, and makes the file again where a hand removed it. Throws IoFailed.
     bool lost() const;
 
-    /// Throws BadInput naming the owner if one lives, as far as a look tells. Changes nothing.
+    /// Throws BadInput naming the owner if one lives, as far as one reading tells. Changes nothing.
     static void refuse_if_owned(const Place& directory);
     /// Whether a file in a directory belongs to this class.
     static bool is_lock(std::string_view name) { return name.starts_with(file_name); }

@@ -9,7 +9,7 @@ inline constexpr int fine = 2;            // samples per pixel along each axis
 inline constexpr int shadow_reach = 4;    // pixels over which nearer ground darkens
 inline constexpr double full_light = 200; // of 255: what shows a colour as it is
 
-/// Balls as discs of samples: how far the surface stands out (spacings' multiples in m), and its light. Drawn at sixteen places
+/// Balls as discs of samples: how far the surface stands out (spacings' multiples in m), and its light. Drawn at sixteen offsets
 /// within a sample where balls are small.
 struct Painter::Stamps {
     int steps, size, middle;

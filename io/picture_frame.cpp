@@ -8,7 +8,7 @@ namespace kuzure::io {
 namespace {
 
 constexpr double outside_share = 0.005; // of the soil at either end of an axis: what may stay outside if it flies far
-constexpr double flies = 2;             // times the extent of the rest
+constexpr double flies = 2;             // times the extent of all others
 constexpr double stands_out = 1.3;      // times the range of the other 98 %
 
 double& axis(Vector& v, int c) { return c == 0 ? v.x : c == 1 ? v.y : v.z; }
@@ -101,7 +101,7 @@ Extent frame_of(const Reach& reach, const Extent& walls, int dimensions, double 
             axis(frame.low, c) = -0.5 * d, axis(frame.high, c) = 0.5 * d;
             continue;
         }
-        // Walls that end not far from the soil are shown to their ends, others cut off in some distance.
+        // Walls that end not far from the soil are shown to their ends, others clipped in some distance.
         const double far = 0.5 * std::max(axis(size, c), 0.5 * widest), margin = std::max(0.12 * widest, 4 * d);
         const double below = walls.empty() ? 0 : axis(soil.low, c) - axis(walls.low, c);
         const double above = walls.empty() ? 0 : axis(walls.high, c) - axis(soil.high, c);
@@ -177,7 +177,7 @@ Stage stage_of(const Extent& frame, scene::View view)
     c.view = view;
     double azimuth = -90, elevation = 0; // deg, where the eye stands
     if (oblique) azimuth = -60, elevation = 24;
-    if (view == scene::View::Top) elevation = 90; // Side and Cut: from the front
+    if (view == scene::View::Top) elevation = 90; // Side and Slice: from the front
     const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
     c.right = {-std::sin(a), std::cos(a), 0};
     c.up = {-std::sin(e) * std::cos(a), -std::sin(e) * std::sin(a), std::cos(e)};

@@ -30,12 +30,12 @@ struct Reach {
     double least = HUGE_VAL, most = -HUGE_VAL;           // of the values that colour it
     double percent_1 = HUGE_VAL, percent_99 = -HUGE_VAL; // of them, of each state
 };
-/// Values and places that are no numbers do not count.
+/// Values and positions that are no numbers do not count.
 Reach reach_of(std::span<const Vector> positions, std::span<const double> values);
 Reach joined(const Reach&, const Reach&);
 
 /// The box to show: where soil comes to in the run, and the walls around it as far as they belong to it. Grains that fly out of all
-/// proportion (beyond 1 % of the soil, and twice as far as the rest) stay outside.
+/// proportion (beyond 1 % of the soil, and twice as far as all others) stay outside.
 Extent frame_of(const Reach&, const Extent& walls, int dimensions, double spacing);
 
 /// Values between which colours differ, and whether there are others beyond.

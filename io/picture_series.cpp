@@ -150,11 +150,11 @@ public:
 
 private:
     /// What all pictures share.
-    struct Look {
+    struct Framing {
         Extent frame;
         ColorRange range;
     };
-    bool in_slice(const Vector& p) const { return view_ != scene::View::Cut || std::fabs(p.y - middle_) <= task_.spacing; }
+    bool in_slice(const Vector& p) const { return view_ != scene::View::Slice || std::fabs(p.y - middle_) <= task_.spacing; }
     Place file_of(const State& s) const { return task_.file ? task_.file(s.number) : picture_file(task_.results, s.number); }
     void complain(const std::string& what)
     {
@@ -180,7 +180,7 @@ private:
                 try {
                     const H5Reader in(states_[first_].file);
                     const SoilColor color(in, task_.color);
-                    if (view_ != scene::View::Cut) break;
+                    if (view_ != scene::View::Slice) break;
                     const auto soil = color.read(in);
                     const Reach r = reach_of(soil.positions, {});
                     if (!r.all.empty()) middle_ = 0.5 * (r.all.low.y + r.all.high.y);
@@ -265,12 +265,12 @@ private:
         states_ = {std::move(states_[next])};
     }
 
-    Painter painter_with(const Look& look, const std::vector<Vector>& walls) const
+    Painter painter_with(const Framing& framing, const std::vector<Vector>& walls) const
     {
         std::vector<Vector> shown;
         for (const Vector& w : walls)
             if (in_slice(w)) shown.push_back(w);
-        return Painter(stage_of(look.frame, view_), look.range, color_->quantity(), task_.title, task_.spacing, shown, flat_);
+        return Painter(stage_of(framing.frame, view_), framing.range, color_->quantity(), task_.title, task_.spacing, shown, flat_);
     }
 
     void paint(const Reach& all)
@@ -282,9 +282,9 @@ private:
         const auto walls = walls_of(first_file_);
         // Walls that events change are in every snapshot.
         const bool walls_change = have_walls_of_their_time(first_file_);
-        const Look look{frame_of(all, reach_of(walls, {}).all, task_.dimensions, task_.spacing),
-                        color_range(all, color_->has_signs(), task_.range)};
-        const Painter painter = painter_with(look, walls);
+        const Framing framing{frame_of(all, reach_of(walls, {}).all, task_.dimensions, task_.spacing),
+                              color_range(all, color_->has_signs(), task_.range)};
+        const Painter painter = painter_with(framing, walls);
         if (team_.rank() == 0 && !painter.missing().empty())
             warnings_.push_back(
                 fmt::format("no font here has \"{}\": pictures show boxes. Remedy: apt-get install fonts-ipafont-gothic, or "
@@ -296,7 +296,7 @@ private:
                 State& s = *mine[k];
                 take_soil(s);
                 const Moment moment{s.soil.positions, s.soil.values, fmt::format("t = {:.{}f} s", s.time, digits_), s.soil.failed};
-                write_lightly(file_of(s), walls_change ? painter_with(look, walls_of(s.file)).draw(moment) : painter.draw(moment));
+                write_lightly(file_of(s), walls_change ? painter_with(framing, walls_of(s.file)).draw(moment) : painter.draw(moment));
                 s.soil = {};
             } catch (const std::exception& e) {
                 complain(e.what());
@@ -335,7 +335,7 @@ private:
     scene::View view_;
     std::size_t first_ = 0; // good state
     Place first_file_;
-    double middle_ = 0; // m, where the slice is cut
+    double middle_ = 0; // m, where the slice lies
     std::optional<SoilColor> color_;
     int digits_ = 0;
     std::size_t kept_ = 0;  // bytes

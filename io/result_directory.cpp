@@ -160,7 +160,7 @@ bool ResultDirectory::owned() const
     try {
         return !ownership_ || !ownership_->lost();
     } catch (const IoFailed&) {
-        return true; // nothing is known: the next look tells, or the next checkpoint fails with words
+        return true; // nothing is known: the next renewal tells, or the next checkpoint fails with words
     }
 }
 

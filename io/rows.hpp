@@ -1,5 +1,5 @@
 #pragma once
-// A table that grows while a run goes on: two header lines, then rows that begin with a time, appended whole, cut back to the
+// A table that grows while a run goes on: two header lines, then rows that begin with a time, appended whole, shortened to the
 // restart time without touching what came before.
 #include "io/file.hpp"
 #include <optional>

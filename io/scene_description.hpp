@@ -341,29 +341,30 @@ template <class A> void describe_output(A& a, scene::Output& output)
               .doc = "height from which a column counts as soil in history.csv; without it one spacing"});
     a.number("output.checkpoint_minutes", output.checkpoint_minutes,
              {.unit = "min", .range = above(0), .fallback = "30.0", .example = "30.0", .doc = "wall time between checkpoints"});
-    a.table("output.picture", output.picture,
-            {.example = R"({ view = "oblique", color = "displacement" })",
-             .doc = "pictures of the snapshots, drawn when the run ends or stops: one camera, one range of colours"},
-            [&](const std::string& p, auto& v) {
-                a.choice(
-                    p + ".view", v.view,
-                    {{"oblique", scene::View::Oblique}, {"side", scene::View::Side}, {"top", scene::View::Top}, {"cut", scene::View::Cut}},
-                    {.fallback = "\"oblique\"",
-                     .example = "\"oblique\"",
-                     .doc = "where from; \"cut\": a slice two spacings thick along x, through the middle of the soil at the start"});
-                a.choice(p + ".color", v.color,
-                         {{"displacement", scene::Color::Displacement},
-                          {"speed", scene::Color::Speed},
-                          {"plastic_strain", scene::Color::PlasticStrain},
-                          {"pressure", scene::Color::Pressure}},
-                         {.fallback = "\"displacement\"", .example = "\"displacement\"", .doc = "what the colour shows"});
-                a.pair(p + ".range", v.range,
-                       {.unit = "of the colour",
-                        .optional = true,
-                        .example = "[0.0, 1.0]",
-                        .doc = "least and largest value of the colours (m, m/s, 1, Pa); without it those of the whole run, of 98 % of "
-                               "the soil where single grains stand far out"});
-            });
+    a.table(
+        "output.picture", output.picture,
+        {.example = R"({ view = "oblique", color = "displacement" })",
+         .doc = "pictures of the snapshots, drawn when the run ends or stops: one camera, one range of colours"},
+        [&](const std::string& p, auto& v) {
+            a.choice(
+                p + ".view", v.view,
+                {{"oblique", scene::View::Oblique}, {"side", scene::View::Side}, {"top", scene::View::Top}, {"cut", scene::View::Slice}},
+                {.fallback = "\"oblique\"",
+                 .example = "\"oblique\"",
+                 .doc = "where from; \"cut\": a slice two spacings thick along x, through the middle of the soil at the start"});
+            a.choice(p + ".color", v.color,
+                     {{"displacement", scene::Color::Displacement},
+                      {"speed", scene::Color::Speed},
+                      {"plastic_strain", scene::Color::PlasticStrain},
+                      {"pressure", scene::Color::Pressure}},
+                     {.fallback = "\"displacement\"", .example = "\"displacement\"", .doc = "what the colour shows"});
+            a.pair(p + ".range", v.range,
+                   {.unit = "of the colour",
+                    .optional = true,
+                    .example = "[0.0, 1.0]",
+                    .doc = "least and largest value of the colours (m, m/s, 1, Pa); without it those of the whole run, of 98 % of "
+                           "the soil where single grains stand far out"});
+        });
     a.flag("output.movie", output.movie,
            {.fallback = "false", .example = "true", .doc = "the pictures as a film at the end (needs ffmpeg)"});
 }
@@ -554,9 +555,8 @@ template <class A> void describe_maps(A& a, std::optional<scene::Maps>& maps)
                a.text(p + ".points", v.points,
                       {.optional = true,
                        .example = "\"houses.csv\"",
-                       .doc = "named points (.csv with the columns name, x, y; .shp; GeoJSON) of which points.csv tells arrival, greatest "
-                              "thickness, "
-                              "speed and pressure"});
+                       .doc = "named points (.csv with the columns name, x, y; .shp; GeoJSON) of which points.csv tells arrival, "
+                              "greatest thickness, speed and pressure"});
            });
 }
 

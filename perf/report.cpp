@@ -66,7 +66,7 @@ PhaseReport phase_report(const Timers& timers, const WorkDone& mine, int threads
                    .asleep = team.sum(mine.asleep),
                    .halo_bytes = team.sum(mine.halo_bytes),
                    .messages = team.sum(mine.messages)};
-    // Every rank's numbers at its own place of a sum: integers add up the same way everywhere.
+    // Every rank's numbers in its own slot of a sum: integers add up the same way everywhere.
     report.first_step.resize(std::size_t(team.size()));
     report.first_step[std::size_t(team.rank())] = mine.first_step;
     static_assert(sizeof(RankStep) == 5 * sizeof(std::int64_t));

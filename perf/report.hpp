@@ -43,7 +43,7 @@ struct PhaseRow {
 /// The timer report of a run.
 struct PhaseReport {
     int ranks = 1, threads = 1;
-    WorkDone work;      // steps; sums over the ranks of the rest
+    WorkDone work;      // steps; sums over the ranks of all others
     PhaseRow total;     // time in any phase
     PhaseRow pair_loop; // interior and rim together
     std::array<PhaseRow, n_phases> rows;

@@ -67,7 +67,7 @@ PY
 
 jobs/install.sh tests || or_stop install
 part_ends install
-echo "building (about five minutes, once; without change seconds)"
+echo "building (ten to fifteen minutes on two cores, once; without change seconds)"
 jobs/build.sh release || or_stop build
 part_ends "build, release"
 

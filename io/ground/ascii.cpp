@@ -120,7 +120,7 @@ Header header(const Path& path, Words& words, bool geographic)
         return needed(at_corner);
     };
     h.grid =
-        placed(corner("xllcorner", "xllcenter"), corner("yllcorner", "yllcenter"), cell, std::int64_t(columns), std::int64_t(rows), file);
+        grid_at(corner("xllcorner", "xllcenter"), corner("yllcorner", "yllcenter"), cell, std::int64_t(columns), std::int64_t(rows), file);
     if (values.contains("nodata_value")) h.nodata = values["nodata_value"];
     return h;
 }
@@ -143,7 +143,7 @@ Raster read_ascii(const Path& path, const std::optional<Window>& window)
     const auto crs = crs_beside(path);
     const auto h = header(path, words, geographic(crs));
     const Part part = part_of(h.grid, window, path.string());
-    Raster r{cut(h.grid, part), crs};
+    Raster r{crop(h.grid, part), crs};
     if (part.empty()) return r;
     const double nodata = h.nodata.value_or(-9999);
     std::string_view word = h.first;

@@ -27,7 +27,7 @@ bool is_geographic(const std::string& wkt);
 double metres_per_unit(const std::string& wkt);
 /// Whether coordinates mean the same in both.
 bool same_crs(const std::string& a, const std::string& b);
-/// Whether a place lies where the system is meant to be used, or within two degrees of it; true where nothing is known of that.
+/// Whether a point lies where the system is meant to be used, or within two degrees of it; true where nothing is known of that.
 bool lies_in(const std::string& wkt, double x, double y);
 /// "EPSG:32652": the zone of UTM around a longitude and latitude.
 std::string utm_zone(double longitude, double latitude);

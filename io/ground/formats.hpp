@@ -14,11 +14,11 @@ struct Part {
 /// The cells whose area meets the window. Throws BadInput where they are more than memory should hold.
 Part part_of(const scene::Grid& whole, const std::optional<Window>&, const std::string& file);
 /// A grid of these cells, all NaN.
-scene::Grid cut(const scene::Grid& whole, const Part&);
+scene::Grid crop(const scene::Grid& whole, const Part&);
 
 /// A grid of one cell size whose south-west corner is at these coordinates: what is a multiple of half a cell, but for the digits of a
 /// file, becomes one, so that the same grid in another format has the same bits. Throws BadInput where cells or their number make no sense.
-scene::Grid placed(double low_x, double low_y, double cell, std::int64_t columns, std::int64_t rows, const std::string& file);
+scene::Grid grid_at(double low_x, double low_y, double cell, std::int64_t columns, std::int64_t rows, const std::string& file);
 /// The size of cells: 0.2 seconds of arc in degrees, whatever digits a file gave.
 double rounded_cell(double cell, bool geographic);
 

@@ -27,8 +27,8 @@ private:
     Window extent_;
 };
 
-/// A raster's values at the points of a grid in another place of the map or another system: its own where the grids coincide, else
-/// bilinear, of means of its cells where those are much smaller; NaN where it has none. Both without a system lie in the same place.
+/// A raster's values at the points of a grid in another part of the map or another system: its own where the grids coincide, else
+/// bilinear, of means of its cells where those are much smaller; NaN where it has none. Both without a system lie where they say.
 std::vector<double> onto(const Path&, const scene::Grid& target, const std::string& crs);
 
 /// The system of a file that names none, or its own; throws BadInput where neither is there, or where it is another one than the map's.
@@ -38,7 +38,7 @@ std::string crs_for(const std::string& own, const std::string& map, const std::s
 /// the beds in it. Gives what is doubtful; errors come alone. Same files, same bits.
 scene::Issues load_ground(Scene&);
 
-/// 16 hexadecimal digits of a grid's place and values.
+/// 16 hexadecimal digits of a grid's position and values.
 std::string digest(const scene::Grid&);
 
 } // namespace kuzure::io

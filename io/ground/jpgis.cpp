@@ -83,7 +83,7 @@ scene::Grid grid_of(const pugi::xml_node& coverage, const std::string& file)
             fmt::format("{}: its cells of {} x {} degrees are not square. Remedy: download it again, the corners ({} {}, {} {}) are not "
                         "those of {} x {} cells",
                         file, dx, dy, low[0], low[1], high[0], high[1], columns, rows));
-    scene::Grid grid = placed(low[1], low[0], rounded_cell(dx, true), std::int64_t(columns), std::int64_t(rows), file);
+    scene::Grid grid = grid_at(low[1], low[0], rounded_cell(dx, true), std::int64_t(columns), std::int64_t(rows), file);
     grid.values.assign(std::size_t(columns * rows), std::numeric_limits<double>::quiet_NaN());
     return grid;
 }
@@ -240,7 +240,7 @@ scene::Grid around(const std::vector<Mesh>& all)
         w = {std::min(w.low_x, o.low_x), std::min(w.low_y, o.low_y), std::max(w.high_x, o.high_x), std::max(w.high_y, o.high_y)};
     }
     const double cell = all[0].grid.cell;
-    return placed(w.low_x, w.low_y, cell, std::llround((w.high_x - w.low_x) / cell), std::llround((w.high_y - w.low_y) / cell), "meshes");
+    return grid_at(w.low_x, w.low_y, cell, std::llround((w.high_x - w.low_x) / cell), std::llround((w.high_y - w.low_y) / cell), "meshes");
 }
 
 } // namespace
@@ -256,7 +256,7 @@ Raster read_jpgis(const Path& path, const std::optional<Window>& window)
     const auto all = meshes(path);
     const scene::Grid whole = around(all);
     const Part part = part_of(whole, window, path.string());
-    Raster r{cut(whole, part), all[0].crs};
+    Raster r{crop(whole, part), all[0].crs};
     if (part.empty()) return r;
     for (const auto& m : all) {
         const auto column = std::llround((m.grid.x - r.grid.x) / whole.cell), row = std::llround((m.grid.y - r.grid.y) / whole.cell);

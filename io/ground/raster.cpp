@@ -39,7 +39,7 @@ Part part_of(const scene::Grid& g, const std::optional<Window>& window, const st
     return p;
 }
 
-scene::Grid cut(const scene::Grid& whole, const Part& p)
+scene::Grid crop(const scene::Grid& whole, const Part& p)
 {
     if (p.empty()) return {whole.x, whole.y, whole.cell, 0, 0, {}};
     scene::Grid g{whole.x + p.column * whole.cell, whole.y + (whole.rows - p.end_row) * whole.cell, whole.cell, p.columns(), p.rows(), {}};
@@ -56,7 +56,7 @@ double rounded_cell(double cell, bool geographic)
     return cell;
 }
 
-scene::Grid placed(double low_x, double low_y, double cell, std::int64_t columns, std::int64_t rows, const std::string& file)
+scene::Grid grid_at(double low_x, double low_y, double cell, std::int64_t columns, std::int64_t rows, const std::string& file)
 {
     if (!std::isfinite(low_x) || !std::isfinite(low_y) || std::abs(low_x) > 1e9 || std::abs(low_y) > 1e9 || !(cell > 0) || cell > 1e6)
         throw BadInput(fmt::format("{}: expected the place and the size of its cells, found a corner at ({}, {}) and cells of {}. Remedy: "

@@ -195,7 +195,7 @@ private:
 
     bool in(const Mass& m, int i, int j) const { return m.rings.empty() || scene::encloses(m.rings, dem_.x_of(i), dem_.y_of(j)); }
 
-    /// Gives cells without a value that touch cells with one the mean of these, some times over: an outline cuts between cells.
+    /// Gives cells without a value that touch cells with one the mean of these, some times over: an outline runs between cells.
     void extend(std::vector<double>& values, int times) const
     {
         for (int t = 0; t < times; ++t) {

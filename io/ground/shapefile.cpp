@@ -1,4 +1,4 @@
-// Shapefiles by shapelib: read, and written through memory so that they come into their place whole.
+// Shapefiles by shapelib: read, and written through memory so that they come into being whole.
 #include "io/ground/crs.hpp"
 #include "io/ground/features.hpp"
 #include "io/ground/formats.hpp"

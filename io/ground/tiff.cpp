@@ -175,7 +175,7 @@ Layout layout(TIFF* tiff, const Path& path)
     const bool geographic = !l.info.crs.empty() && is_geographic(l.info.crs);
     const double cell = rounded_cell(dx, geographic);
     const double shift = kind == RasterPixelIsPoint ? 0.5 : 0;
-    l.info.grid = placed(x - (column + shift) * cell, y + (row + shift) * cell - double(rows) * cell, cell, columns, rows, file);
+    l.info.grid = grid_at(x - (column + shift) * cell, y + (row + shift) * cell - double(rows) * cell, cell, columns, rows, file);
     l.info.format = "GeoTIFF";
     l.info.numbers = fmt::format("{}{}", l.format == SAMPLEFORMAT_IEEEFP ? "float" : l.format == SAMPLEFORMAT_INT ? "int" : "uint", l.bits);
     l.info.nodata = nodata_of(tiff, file);
@@ -291,7 +291,7 @@ Raster read_tiff(const Path& path, const std::optional<Window>& window)
     const Tiff tiff = open(path);
     const Layout l = layout(tiff.get(), path);
     const Part part = part_of(l.info.grid, window, file);
-    Raster r{cut(l.info.grid, part), l.info.crs};
+    Raster r{crop(l.info.grid, part), l.info.crs};
     if (!part.empty()) Cells(tiff.get(), l, part, file, r.grid).read();
     return r;
 }

@@ -98,7 +98,7 @@ struct Cloud {
     {
         StepInput in{.particles = &particles, .lists = &lists, .soils = soils, .dt = dt, .kick = dt, .next = dt, .energy_unit = 1e-12};
         in.forces.gravity = scene.effects.gravity.value_or(Vector{});
-        // a scheme may look half a step back from the places its lists are pruned at
+        // a scheme may read half a step back from the positions its lists are pruned at
         double fastest = 0;
         for (Index i = 0; i < particles.size(); ++i) fastest = std::max(fastest, length(std::as_const(particles)[field::velocity][i]));
         in.margin = 2 * dt * fastest;

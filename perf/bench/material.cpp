@@ -1,4 +1,5 @@
 // The constitutive law alone: rotation, Hooke and the return to the cone, elastic and yielding, double and lanes.
+#include "solver/core/simd.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include <benchmark/benchmark.h>
 

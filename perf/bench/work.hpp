@@ -1,6 +1,7 @@
 #pragma once
 // The scenes whose pair passes are measured, by name, and one pass made ready to be run again and again.
 #include "perf/bench/cloud.hpp"
+#include "solver/core/simd.hpp"
 #include <omp.h>
 
 namespace kuzure::bench {

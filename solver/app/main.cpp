@@ -70,12 +70,12 @@ void say_no_memory(int rank)
 /// The chosen command on a team. Every rank has the same arguments.
 int carry_out(const Action& chosen, const Comm& comm, bool words_count)
 {
-    const bool speaks = comm.rank() == 0;
-    const auto say = [&](const std::exception& e, Exit code) { return speaks ? fail(e.what(), code) : int(code); };
+    const bool prints = comm.rank() == 0;
+    const auto say = [&](const std::exception& e, Exit code) { return prints ? fail(e.what(), code) : int(code); };
     try {
         require_one_program(comm);
         const Exit code = chosen(comm);
-        return speaks && words_count ? said(int(code)) : int(code);
+        return prints && words_count ? said(int(code)) : int(code);
     } catch (const BadInput& e) {
         return say(e, Exit::BadInput);
     } catch (const NumbersFailed& e) {

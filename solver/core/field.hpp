@@ -68,7 +68,7 @@ inline constexpr struct HalfDensity : Field<"half_step_density", "kg/m^3", Shape
 } half_density;
 inline constexpr struct HalfStress : Field<"half_step_stress", "Pa", Shape::Symmetric> {
 } half_stress;
-// Where the particle was at the last sort (its place in the global order) and at t = 0 (its displacement).
+// Where the particle was at the last sort (its position in the global order) and at t = 0 (its displacement).
 inline constexpr struct SortedPosition : Field<"sorted_position", "m", Shape::Vector> {
 } sorted_position;
 inline constexpr struct Origin : Field<"origin", "m", Shape::Vector> {

@@ -53,7 +53,7 @@ template <class T> struct HugePages {
         const std::size_t page = std::size_t(1) << 21, line = alignof(T) > 64 ? alignof(T) : 64;
         const bool large = n * sizeof(T) >= page / 2;
         const std::size_t align = large ? page : line;
-        // Loops walk many arrays at one index. Arrays that began at the same place of a page would fight for the same few
+        // Loops walk many arrays at one index. Arrays that began at the same offset of a page would fight for the same few
         // ways of the first-level cache, so each begins some lines further than the one before.
         const std::size_t stagger = line * (1 + 3 * detail::allocations++ % (4096 / line));
         const std::size_t bytes = (n * sizeof(T) + stagger + align - 1) / align * align;

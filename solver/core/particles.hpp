@@ -108,8 +108,8 @@ public:
     /// Append these particles' fields to a byte buffer, particle by particle: the form in which they migrate.
     void pack(std::span<const Index> which, std::vector<std::byte>& out) const
     {
-        const std::size_t row = bytes_per_particle(), start = out.size();
-        out.resize(start + row * which.size());
+        const std::size_t each = bytes_per_particle(), start = out.size();
+        out.resize(start + each * which.size());
         std::byte* to = out.data() + start;
         for (const Index i : which)
             for_each_column([&](const auto& column) {
@@ -120,9 +120,9 @@ public:
     /// Append particles packed by a store with the same fields present. Throws Broken on a size that does not fit.
     void unpack(std::span<const std::byte> in)
     {
-        const std::size_t row = bytes_per_particle();
-        ensure(in.size() % row == 0, "a message of particles holds a fraction of a particle");
-        const Index first = size_, n = Index(in.size() / row);
+        const std::size_t each = bytes_per_particle();
+        ensure(in.size() % each == 0, "a message of particles holds a fraction of a particle");
+        const Index first = size_, n = Index(in.size() / each);
         resize(first + n);
         const std::byte* from = in.data();
         for (Index i = first; i < first + n; ++i)

@@ -2,19 +2,12 @@
 // The only file that knows a SIMD type or an intrinsic. Everything else is written once for a number type V that is
 // `double` (or `float`): one particle, the plain reference; or `Simd<T, W>`: W particles in one register. A width that
 // the machine has no register for still works (the compiler splits it), so eight lanes can be tested on AVX2.
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <type_traits>
+#include "solver/core/scalar.hpp"
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
 
 namespace kuzure {
-
-using Index = std::int32_t;
-
-#define KUZURE_INLINE inline __attribute__((always_inline))
 
 namespace detail {
 template <class T, int W> struct VectorOf {
@@ -33,24 +26,6 @@ template <class T, int W> struct Simd {
     KUZURE_INLINE Simd(T a) : v(a - Vec{}) {}
     KUZURE_INLINE T operator[](int lane) const { return v[lane]; }
 };
-
-namespace detail {
-template <class V> struct NumberOf {
-    using type = typename V::Number;
-    static constexpr int lanes = V::lanes;
-};
-template <> struct NumberOf<double> {
-    using type = double;
-    static constexpr int lanes = 1;
-};
-template <> struct NumberOf<float> {
-    using type = float;
-    static constexpr int lanes = 1;
-};
-} // namespace detail
-
-template <class V> using number = typename detail::NumberOf<V>::type;
-template <class V> inline constexpr int width = detail::NumberOf<V>::lanes;
 
 #if defined(__AVX512F__)
 inline constexpr int register_bytes = 64;
@@ -115,9 +90,6 @@ KUZURE_T Simd<T, W>& operator+=(Simd<T, W>& a, Simd<T, W> b) { return a = a + b;
 KUZURE_T Simd<T, W>& operator-=(Simd<T, W>& a, Simd<T, W> b) { return a = a - b; }
 KUZURE_T Simd<T, W>& operator*=(Simd<T, W>& a, Simd<T, W> b) { return a = a * b; }
 
-/// a * b + c with one rounding, on every instruction set: the bits do not depend on what the compiler would contract.
-KUZURE_INLINE double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
-KUZURE_INLINE float fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
 KUZURE_T Simd<T, W> fma(Simd<T, W> a, Simd<T, W> b, Simd<T, W> c)
 {
 #if defined(__AVX512F__)
@@ -132,13 +104,6 @@ KUZURE_T Simd<T, W> fma(Simd<T, W> a, Simd<T, W> b, Simd<T, W> c)
     for (int k = 0; k < W; ++k) r.v[k] = fma(T(a.v[k]), T(b.v[k]), T(c.v[k]));
     return r;
 }
-/// c - a * b with one rounding.
-template <class V> KUZURE_INLINE V fnma(V a, V b, V c) { return fma(-a, b, c); }
-
-KUZURE_INLINE double min(double a, double b) { return a < b ? a : b; }
-KUZURE_INLINE double max(double a, double b) { return a > b ? a : b; }
-KUZURE_INLINE float min(float a, float b) { return a < b ? a : b; }
-KUZURE_INLINE float max(float a, float b) { return a > b ? a : b; }
 /// The smaller of two; the second where either is not a number, as the machine instruction does.
 KUZURE_T Simd<T, W> min(Simd<T, W> a, Simd<T, W> b)
 {
@@ -165,8 +130,6 @@ KUZURE_T Simd<T, W> max(Simd<T, W> a, Simd<T, W> b)
 #endif
     return {a.v > b.v ? a.v : b.v};
 }
-KUZURE_INLINE double sqrt(double a) { return __builtin_sqrt(a); }
-KUZURE_INLINE float sqrt(float a) { return __builtin_sqrtf(a); }
 KUZURE_T Simd<T, W> sqrt(Simd<T, W> a)
 {
 #if defined(__AVX512F__)
@@ -181,7 +144,6 @@ KUZURE_T Simd<T, W> sqrt(Simd<T, W> a)
     for (int k = 0; k < W; ++k) r.v[k] = sqrt(T(a.v[k]));
     return r;
 }
-KUZURE_INLINE double abs(double a) { return __builtin_fabs(a); }
 KUZURE_T Simd<T, W> abs(Simd<T, W> a) { return max(a, -a); }
 
 // ---- comparison: a Mask has one bit of truth a lane ---------------------------------------------------------------
@@ -197,8 +159,6 @@ template <class T, int W> struct Mask {
 };
 
 /// True in the lanes where a < b.
-KUZURE_INLINE bool less(double a, double b) { return a < b; }
-KUZURE_INLINE bool less(float a, float b) { return a < b; }
 KUZURE_T Mask<T, W> less(Simd<T, W> a, Simd<T, W> b)
 {
 #if defined(__AVX512F__)
@@ -209,7 +169,6 @@ KUZURE_T Mask<T, W> less(Simd<T, W> a, Simd<T, W> b)
         return {a.v < b.v};
 }
 /// One bit a lane, lane 0 lowest.
-KUZURE_INLINE unsigned bits(bool m) { return m; }
 KUZURE_T unsigned bits(Mask<T, W> m)
 {
     if constexpr (Mask<T, W>::in_mask_register) return m.m;
@@ -224,8 +183,6 @@ KUZURE_T unsigned bits(Mask<T, W> m)
     }
 }
 /// yes where the mask is set, no elsewhere.
-KUZURE_INLINE double select(bool m, double yes, double no) { return m ? yes : no; }
-KUZURE_INLINE float select(bool m, float yes, float no) { return m ? yes : no; }
 KUZURE_T Simd<T, W> select(Mask<T, W> m, Simd<T, W> yes, Simd<T, W> no)
 {
 #if defined(__AVX512F__)
@@ -236,46 +193,9 @@ KUZURE_T Simd<T, W> select(Mask<T, W> m, Simd<T, W> yes, Simd<T, W> no)
         return {m.m ? yes.v : no.v};
 }
 
-// ---- memory ------------------------------------------------------------------------------------------------------
-/// W consecutive numbers, at any address.
-template <class V> KUZURE_INLINE V load(const number<V>* p)
-{
-    if constexpr (width<V> == 1) return *p;
-    else {
-        V r;
-        std::memcpy(&r.v, p, sizeof r.v);
-        return r;
-    }
-}
-template <class V> KUZURE_INLINE void store(number<V>* p, V a)
-{
-    if constexpr (width<V> == 1) *p = a;
-    else std::memcpy(p, &a.v, sizeof a.v);
-}
-/// The first n lanes only; nothing beyond is touched.
-template <class V> KUZURE_INLINE void store_first(number<V>* p, V a, int n)
-{
-    if (n >= width<V>) return store(p, a);
-    if constexpr (width < V >> 1) {
-        const detail::Lanes lanes(a);
-        for (int k = 0; k < n; ++k) p[k] = lanes[k];
-    }
-}
-/// table[index[lane]] in each lane.
-template <class V> KUZURE_INLINE V gather(const number<V>* table, const std::int32_t* index)
-{
-    if constexpr (width<V> == 1) return table[*index];
-    else {
-        V r;
-        for (int k = 0; k < width<V>; ++k) r.v[k] = table[index[k]];
-        return r;
-    }
-}
-KUZURE_INLINE double lane(double a, int) { return a; }
-KUZURE_INLINE float lane(float a, int) { return a; }
+// ---- single lanes ------------------------------------------------------------------------------------------------
 KUZURE_T T lane(Simd<T, W> a, int k) { return detail::Lanes<T, W>(a)[k]; }
 
-KUZURE_INLINE double sum(double a) { return a; }
 /// Sum over the lanes, lane 0 first. Only for sums that are exact in any order, or for tests.
 KUZURE_T T sum(Simd<T, W> a)
 {
@@ -284,7 +204,6 @@ KUZURE_T T sum(Simd<T, W> a)
     for (int k = 1; k < W; ++k) s += lanes[k];
     return s;
 }
-KUZURE_INLINE double largest(double a) { return a; }
 KUZURE_T T largest(Simd<T, W> a)
 {
     const detail::Lanes lanes(a);

@@ -50,7 +50,7 @@ public:
         min(std::span(&v, 1));
         return v;
     }
-    /// In no fixed order. Floating point alone, so that a number of seconds is not cut to whole ones.
+    /// In no fixed order. Floating point alone, so that a number of seconds is not rounded to whole ones.
     template <std::floating_point F> double sum(F v) const
     {
         double all = v;

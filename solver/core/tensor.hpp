@@ -1,7 +1,7 @@
 #pragma once
 // Small vectors and tensors over a number type V (double or lanes). Plain structs; sums are written with fma, left to
 // right, so that the bits are the same for every V.
-#include "solver/core/simd.hpp"
+#include "solver/core/scalar.hpp"
 
 namespace kuzure {
 

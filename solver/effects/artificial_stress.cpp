@@ -10,10 +10,10 @@ Stress tension(const Stress& s, double epsilon)
     const double det = s.xx * m2 - s.xy * (s.xy * s.zz - s.yz * s.xz) + s.xz * (s.xy * s.yz - s.yy * s.xz);
     if (s.xx <= 0 && s.yy <= 0 && s.zz <= 0 && m1 >= 0 && m2 >= 0 && m3 >= 0 && det <= 0) return {};
 
-    // Jacobi rotations: a fixed number of sweeps, so that the bits depend on nothing but sigma.
+    // Jacobi rotations: a fixed number of rounds, so that the bits depend on nothing but sigma.
     double a[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
     double n[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (int sweep = 0; sweep < 8; ++sweep)
+    for (int round = 0; round < 8; ++round)
         for (int p = 0; p < 2; ++p)
             for (int q = p + 1; q < 3; ++q) {
                 // Above 1e154 the angle is none, and the square of its cotangent no number.

@@ -129,7 +129,7 @@ struct Shown {
 };
 /// A wall law. It is given i, the point with its own normal and depth (d_A = x_ij . n_j - depth_j), where i is as seen from the wall
 /// as a whole (its nearest point), and the volume of a particle at reference density. j is an element of the array of points given
-/// to rates(): a law that knows more of each point finds it by its place there.
+/// to rates(): a law that knows more of each point finds it by its index there.
 using WallLaw = std::function<Shown(const Particle& i, const WallPoint& j, const scene::Contact& nearest, double volume)>;
 
 /// The wall point takes i's density and stress and the velocity that makes the wall's surface stand still,

@@ -29,10 +29,10 @@ std::unique_ptr<PairModel> choose_model(const scene::Interactions& s, Arithmetic
 }
 std::unique_ptr<PairModel> choose_model(const Scene& s, Arithmetic a) { return choose_model(s.interactions(), a); }
 
-std::size_t row_bytes(const PairModel& model)
+std::size_t ghost_bytes(const PairModel& model)
 {
     std::size_t b = 0;
-    for (const Stage& s : model.stages()) b += s.row_bytes;
+    for (const Stage& s : model.stages()) b += s.ghost_bytes;
     return b;
 }
 

@@ -37,7 +37,7 @@ protected:
     };
     template <class S>
     using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
-    using Lane = Row<W>;
+    using Wide = WideLanes<W>;
 
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
 
@@ -63,18 +63,18 @@ private:
         i.position = positions_of<V>(kinematics_.data(), i.first);
         const auto pruned = in.lists->pruned(cluster);
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
-        ForceSums<Lane> sums;
+        ForceSums<Wide> sums;
         // every particle meets itself once in its list
         tally.pairs += sum_forces(i, near, sums) - std::popcount(i.moving);
         unsigned awake = 0;
         if (in.sleep == SleepStage::Freeze) awake = awake_near(i, near, kinematics_.data(), stresses_.data(), 2 * model_.kernel.h);
-        ForceWalls<Lane> walls{};
-        WallPower<Lane> power;
+        ForceWalls<Wide> walls{};
+        WallPower<Wide> power;
         const auto runs = in.lists->walls(cluster);
         const bool moving = !runs.empty() && Below::walls_move();
         if (moving) power = {}, tally.pairs += sum_wall_forces<true>(in, i, runs, stress_of(in, i), walls, &power);
         else if (!runs.empty()) tally.pairs += sum_wall_forces<false>(in, i, runs, stress_of(in, i), walls, nullptr);
-        ForceWalls<Lane> loaded;
+        ForceWalls<Wide> loaded;
         const bool pressed = !runs.empty() && any_pressure(in, i);
         if (pressed) loaded = {}, sum_wall_forces<false>(in, i, runs, pressure_of(in, i), loaded, nullptr);
         Below::for_each_register(
@@ -110,7 +110,7 @@ private:
     }
 
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
-    KUZURE_INLINE std::int64_t sum_forces(const Cluster<V>& i, std::span<const Index> near, ForceSums<Lane>& out) const
+    KUZURE_INLINE std::int64_t sum_forces(const Cluster<V>& i, std::span<const Index> near, ForceSums<Wide>& out) const
     {
         const Kinematics<T>* neighbours = kinematics_.data();
         const Stresses<T>* records = stresses_.data();
@@ -153,7 +153,7 @@ private:
     /// Returns the wall pairs inside the support; sigma: what walls mirror of each lane's stress.
     template <bool moving>
     [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
-                                                   const Sym3<V>& sigma, ForceWalls<Lane>& out, WallPower<Lane>* power_out) const
+                                                   const Sym3<V>& sigma, ForceWalls<Wide>& out, WallPower<Wide>* power_out) const
     {
         const auto v = std::as_const(*in.particles)[field::velocity];
         const auto narrow = [&](const double* column) { return load_narrow<V>(column + i.first); };
@@ -197,14 +197,14 @@ private:
     }
 
     /// `power`: of walls that move; none: they stand still. `loaded`: what walls add to pressures; none: nothing.
-    KUZURE_INLINE void update_force(const StepInput& in, const ForceSums<Lane>& rows, const ForceWalls<Lane>& wall_rows, bool walled,
-                                    const WallPower<Lane>* power, const ForceWalls<Lane>* loaded, const Lanes& lanes, unsigned awake,
+    KUZURE_INLINE void update_force(const StepInput& in, const ForceSums<Wide>& soil_sums, const ForceWalls<Wide>& wall_sums, bool walled,
+                                    const WallPower<Wide>* power, const ForceWalls<Wide>* loaded, const Lanes& lanes, unsigned awake,
                                     Tally<U>& tally)
     {
         auto& p = *in.particles;
         const auto& was = std::as_const(p);
         const U zero(0.0), half(0.5), factor(scale_), dt(in.dt), next(in.next), half_dt = half * dt, half_next = half * next;
-        const auto sums = lanes_at<U, ForceSums<U>, ForceSums<Lane>, W>(rows, lanes.first);
+        const auto sums = lanes_at<U, ForceSums<U>, ForceSums<Wide>, W>(soil_sums, lanes.first);
         const LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
         const Sym3<U> sigma = was[field::stress].template load<U>(lanes.at);
         const U rho = was[field::density].template load<U>(lanes.at);
@@ -225,7 +225,7 @@ private:
         if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
         if (walled) {
             Watts watts{zero, zero};
-            wall = wall_acceleration(in, wall_rows, lanes, U(volume_) * soil.rho0 / rho, rho, power, watts);
+            wall = wall_acceleration(in, wall_sums, lanes, U(volume_) * soil.rho0 / rho, rho, power, watts);
             if (power) {
                 const U mass = U(volume_) * soil.rho0;
                 Below::book_work_of_walls(in, lanes, mass * watts.now, mass * watts.next, tally.energy.wall, tally.later.wall, tally);
@@ -254,15 +254,15 @@ private:
     /// What loads do to each lane, m/s^2. A pressure p that follows its face is what a tension p of the particle and of all around it would
     /// do, sum_j V_j 2 p grad W and at walls sum f P (p grad W): nothing inside soil and beside walls, p on the area of a free face.
     /// `inward`: of a unit of pressure without walls.
-    KUZURE_INLINE Vec3<U> load_acceleration(const StepInput& in, Vec3<U> inward, const ForceWalls<Lane>* wall_rows, const Lanes& lanes,
+    KUZURE_INLINE Vec3<U> load_acceleration(const StepInput& in, Vec3<U> inward, const ForceWalls<Wide>* wall_sums, const Lanes& lanes,
                                             U rho0, U rho) const
     {
         auto& p = *in.particles;
         const auto push = p[field::load_push];
         const U mass = U(volume_) * rho0;
         Vec3<U> a = lane_by_lane<U>([&](int k) { return load_on(in, lanes.particle(k)).pressure; }) * inward;
-        if (wall_rows) {
-            const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(*wall_rows, lanes.first);
+        if (wall_sums) {
+            const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Wide>, W>(*wall_sums, lanes.first);
             a = a + (U(scale_) * mass / (rho * rho)) * (w.held + w.pressing);
         }
         for (int k = 0; k < lanes.n; ++k)
@@ -281,7 +281,7 @@ private:
             if (walled) all = before + wall;
         told.store(lanes.at, select(written<U>(lanes), all, before), lanes.n);
     }
-    struct Moved { // after the step: place, velocity half a step before, velocity, acceleration
+    struct Moved { // after the step: position, velocity half a step before, velocity, acceleration
         Vec3<U> x, u, v, a;
     };
     struct Forces { // per unit of mass, m/s^2
@@ -349,10 +349,10 @@ private:
     }
     /// What walls do to each lane, m/s^2: the adjoint force, and Coulomb's friction, whose slip it moves on. `watts`: the power of walls
     /// that move, of a unit of mass.
-    KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Lane>& rows, const Lanes& lanes, U volume, U rho,
-                                            const WallPower<Lane>* power_rows, Watts& watts) const
+    KUZURE_INLINE Vec3<U> wall_acceleration(const StepInput& in, const ForceWalls<Wide>& wall_sums, const Lanes& lanes, U volume, U rho,
+                                            const WallPower<Wide>* wall_power, Watts& watts) const
     {
-        const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Lane>, W>(rows, lanes.first);
+        const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Wide>, W>(wall_sums, lanes.first);
         const U scale = U(scale_) * volume / rho;
         auto& p = *in.particles;
         const U push_out = lane_by_lane<U>([&](int k) {
@@ -361,8 +361,8 @@ private:
         });
         const Vec3<U> held = scale * w.held + push_out * w.out;
         WallPower<U> power{};
-        if (power_rows) {
-            power = lanes_at<U, WallPower<U>, WallPower<Lane>, W>(*power_rows, lanes.first);
+        if (wall_power) {
+            power = lanes_at<U, WallPower<U>, WallPower<Wide>, W>(*wall_power, lanes.first);
             watts = {scale * power.held, scale * power.held_next};
         }
         if (!p.has(field::wall_slip)) return held;
@@ -390,7 +390,7 @@ private:
             const double most = limit[i] + lag(in.dt, m.c_p, h_).take * presses;
             // the faces' mean velocity
             Vector carried{}, carried_next{};
-            if (power_rows && at(power.facing, k) != 0) {
+            if (wall_power && at(power.facing, k) != 0) {
                 const double share = 1 / at(power.facing, k);
                 carried = share * Vector{at(power.carried.x, k), at(power.carried.y, k), at(power.carried.z, k)};
                 carried_next = share * Vector{at(power.carried_next.x, k), at(power.carried_next.y, k), at(power.carried_next.z, k)};
@@ -400,11 +400,11 @@ private:
             slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
             const Vector all = counts ? push + f.force : f.force;
             out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;
-            if (!power_rows) continue;
+            if (!wall_power) continue;
             worked[0][k] = (counts ? s * at(power.pressing, k) : 0) + dot(f.force, carried);
             worked[1][k] = (counts ? s * at(power.pressing_next, k) : 0) + dot(f.force, carried_next);
         }
-        if (power_rows) watts.now = watts.now + load<U>(worked[0]), watts.next = watts.next + load<U>(worked[1]);
+        if (wall_power) watts.now = watts.now + load<U>(worked[0]), watts.next = watts.next + load<U>(worked[1]);
         return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};
     }
 };

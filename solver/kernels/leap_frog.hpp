@@ -10,8 +10,8 @@ namespace kuzure {
 
 /// What the walls add to the sums of a cluster, one number a lane.
 template <int W> struct WallShare {
-    double walled[row_length<W>] = {}; // 1 for a particle that feels a wall
-    double power[row_length<W>] = {};  // taken by the walls, per unit of rho_i V_i/m_i
+    double walled[wide_length<W>] = {}; // 1 for a particle that feels a wall
+    double power[wide_length<W>] = {};  // taken by the walls, per unit of rho_i V_i/m_i
 };
 
 template <class M, class V> class LeapFrog final : public ClusterPass<M, V> {
@@ -28,24 +28,24 @@ template <class M, class V> class LeapFrog final : public ClusterPass<M, V> {
     template <class S>
     using Sums = SumsOf<S, VelocityGradient, StressForce, ViscousPower, typename M::ArtificialStressTerm, typename M::DiffusionTerm,
                         typename M::CorrectionTerm>;
-    using Rows = Sums<Row<W>>;
+    using WideSums = Sums<WideLanes<W>>;
 
 public:
     explicit LeapFrog(const scene::Interactions& s) : Base(s)
     {
-        const std::size_t row = sizeof(Record<T>) + (M::tensile ? sizeof(Tension<T>) : 0);
+        const std::size_t bytes = sizeof(Record<T>) + (M::tensile ? sizeof(Tension<T>) : 0);
         // Without terms: r 3, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, F and volume 8, grad W 3;
         // viscosity: approach 6, pressure 6, on the diagonal 3, power 3.
         // Update: scaled sums 9, force 27, rates 25, rotation 110, two strain increments 50, two returns to the cone 80, values 70.
         // Columns read 23 and written 21, one record read and one written, four bytes a list entry.
-        stage_ = {"pass", row,
+        stage_ = {"pass", bytes,
                   33 + (M::viscous ? 18.0 : 0.0) + VelocityGradient::flops + StressForce::flops + M::ArtificialStressTerm::flops +
                       M::DiffusionTerm::flops + M::CorrectionTerm::flops,
                   494, 44 * 8 + 2 * sizeof(Record<T>) + 4 * 120.0 / W};
     }
     std::string name() const override { return Base::lanes_name(); }
     std::span<const Stage> stages() const override { return {&stage_, 1}; }
-    std::size_t record_bytes() const override { return 2 * stage_.row_bytes; }
+    std::size_t record_bytes() const override { return 2 * stage_.ghost_bytes; }
     void require_fields(Particles& p, bool) const override { p.require(field::half_velocity, field::half_density, field::half_stress); }
     void start(Particles& p) const override
     {
@@ -132,7 +132,7 @@ private:
         const Record<T>* records = now_.data();
         Base::load_lanes(i, in, records, [&](Index k) { return records[k].c_p; });
         const auto near = Base::near(i, in, cluster, records);
-        Rows sums;
+        WideSums sums;
         // every particle meets itself once in its list
         tally.pairs += sum_over_soil(i, near, sums) - std::popcount(i.moving);
         unsigned awake = 0;
@@ -153,7 +153,7 @@ private:
     }
 
     /// Adds the pairs with soil; returns those inside the support. Entries of the list beyond it add exact zeros.
-    KUZURE_INLINE std::int64_t sum_over_soil(const Cluster<V>& i, std::span<const Index> near, Rows& out) const
+    KUZURE_INLINE std::int64_t sum_over_soil(const Cluster<V>& i, std::span<const Index> near, WideSums& out) const
     {
         const Record<T>* records = now_.data();
         const auto [support, support2, softening, tiny] = Base::lengths();
@@ -209,7 +209,7 @@ private:
     }
 
     /// Adds the walls' share to the sums of a cluster; returns the pairs inside the support.
-    [[gnu::noinline]] std::int64_t sum_over_walls(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, Rows& out,
+    [[gnu::noinline]] std::int64_t sum_over_walls(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, WideSums& out,
                                                   WallShare<W>& share) const
     {
         const Mirrored law;
@@ -243,8 +243,8 @@ private:
                 }
             }
             double sums[9][W];
-            const V* rows[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
-            for (int k = 0; k < 9; ++k) store_wide(sums[k], *rows[k]);
+            const V* members[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
+            for (int k = 0; k < 9; ++k) store_wide(sums[k], *members[k]);
             for (int k = 0; k < i.count; ++k) {
                 const auto of = [&](int first) {
                     return Vector{volume_ * sums[first][k], volume_ * sums[first + 1][k], volume_ * sums[first + 2][k]};
@@ -280,7 +280,7 @@ private:
     }
     /// What one wall does to the particle `at`, lane k: from its sums of grad W, of factors times grad W, of viscous pressures.
     void feel_wall(const scene::Wall& wall, const StepInput& in, Index at, const WallContact& c, Vector g, Vector b, Vector q, int k,
-                   Rows& out, WallShare<W>& share) const
+                   WideSums& out, WallShare<W>& share) const
     {
         const auto& p = std::as_const(*in.particles);
         Vector force = 2.0 * (c.stress * g) - q, mirrored = c.mirrored;
@@ -301,13 +301,13 @@ private:
         share.power[k] -= scale_ * (dot(p[field::velocity][at], force) + stress_power);
     }
     /// The force of one wall and its share of the velocity gradient, -v (x) b, to lane k.
-    static void add_wall(Rows& out, int k, Vector force, Vector v, Vector b)
+    static void add_wall(WideSums& out, int k, Vector force, Vector v, Vector b)
     {
         out.force.x.at[k] += force.x, out.force.y.at[k] += force.y, out.force.z.at[k] += force.z;
-        const auto row = [&](Vec3<Row<W>>& L, double vk) {
+        const auto add = [&](Vec3<WideLanes<W>>& L, double vk) {
             L.x.at[k] = fma(vk, b.x, L.x.at[k]), L.y.at[k] = fma(vk, b.y, L.y.at[k]), L.z.at[k] = fma(vk, b.z, L.z.at[k]);
         };
-        row(out.grad_v.x, -v.x), row(out.grad_v.y, -v.y), row(out.grad_v.z, -v.z);
+        add(out.grad_v.x, -v.x), add(out.grad_v.y, -v.y), add(out.grad_v.z, -v.z);
     }
 
     // ---- the update ----
@@ -331,11 +331,11 @@ private:
     };
 
     /// The constitutive law and the leap-frog of some lanes.
-    KUZURE_INLINE void update(const StepInput& in, const Rows& rows, const WallShare<W>& share, const Lanes& lanes, unsigned awake,
+    KUZURE_INLINE void update(const StepInput& in, const WideSums& wide, const WallShare<W>& share, const Lanes& lanes, unsigned awake,
                               Tally<U>& tally)
     {
         auto& p = *in.particles;
-        const auto sums = lanes_at<U, Sums<U>, Rows, W>(rows, lanes.first);
+        const auto sums = lanes_at<U, Sums<U>, WideSums, W>(wide, lanes.first);
         LaneSoil<U> soil = soil_of<U>(in.soils, std::as_const(p)[field::soil].column[0], lanes);
         const Before now{p[field::velocity].template load<U>(lanes.at), p[field::stress].template load<U>(lanes.at),
                          p[field::density].template load<U>(lanes.at)};
@@ -456,21 +456,22 @@ private:
     KUZURE_INLINE void write_records(const Lanes& lanes, const LaneSoil<U>& soil, const After& a)
     {
         const U volume = U(volume_) * soil.rho0 / a.rho;
-        double rows[14][width<U>];
+        double fields[14][width<U>];
         const U columns[14] = {a.x.x, a.x.y,      a.x.z,      a.v.x,      a.v.y,      a.v.z,      volume,
                                a.rho, a.sigma.xx, a.sigma.yy, a.sigma.zz, a.sigma.xy, a.sigma.yz, a.sigma.xz};
-        for (int k = 0; k < 14; ++k) store(rows[k], columns[k]);
+        for (int k = 0; k < 14; ++k) store(fields[k], columns[k]);
         for (int k = 0; k < lanes.n; ++k) {
             Record<T>& r = next_[lanes.at + k];
-            r.x = fixed_(rows[0][k]), r.y = fixed_(rows[1][k]), r.z = fixed_(rows[2][k]);
-            r.vx = T(rows[3][k]), r.vy = T(rows[4][k]), r.vz = T(rows[5][k]);
-            r.volume = T(rows[6][k]), r.density = T(rows[7][k]);
-            r.xx = T(rows[8][k]), r.yy = T(rows[9][k]), r.zz = T(rows[10][k]);
-            r.xy = T(rows[11][k]), r.yz = T(rows[12][k]), r.xz = T(rows[13][k]);
+            r.x = fixed_(fields[0][k]), r.y = fixed_(fields[1][k]), r.z = fixed_(fields[2][k]);
+            r.vx = T(fields[3][k]), r.vy = T(fields[4][k]), r.vz = T(fields[5][k]);
+            r.volume = T(fields[6][k]), r.density = T(fields[7][k]);
+            r.xx = T(fields[8][k]), r.yy = T(fields[9][k]), r.zz = T(fields[10][k]);
+            r.xy = T(fields[11][k]), r.yz = T(fields[12][k]), r.xz = T(fields[13][k]);
             r.c_p = T(lane(soil.c, k)), r.awake = T(0);
             if constexpr (M::tensile)
-                next_tension_[lanes.at + k] = make_tension<T>(
-                    Stress{rows[8][k], rows[9][k], rows[10][k], rows[11][k], rows[12][k], rows[13][k]}, model_.artificial_stress.epsilon);
+                next_tension_[lanes.at + k] =
+                    make_tension<T>(Stress{fields[8][k], fields[9][k], fields[10][k], fields[11][k], fields[12][k], fields[13][k]},
+                                    model_.artificial_stress.epsilon);
         }
     }
     KUZURE_INLINE void detect(const StepInput& in, const Lanes& lanes, Vec3<U> a, Vec3<U> v, unsigned awake)

@@ -49,46 +49,45 @@ struct StepInput {
     double calm_speed = 0, detection_interval = 0; // m/s, s: until a sleeper moves again at the earliest
 };
 
-/// Where a wall stands at the start of a step, at its end and at that of the next, seen from where it stood when the model's walls were
-/// set.
-struct WallPlace {
+/// Where a wall stands at the start of a step, at its end and at that of the next, seen from its pose when the model's walls were set.
+struct WallPoses {
     scene::Pose before, after, later;
 };
 /// All walls of a scene in a step of length dt before one of length `next`, s; of no length: at its end.
 struct WallStep {
-    std::span<const WallPlace> walls;
+    std::span<const WallPoses> walls;
     double dt, next;
     bool midway; // of the step, else at its end
     /// Mean velocity (m/s) of what was at x (m) when walls were set, in this step and in the next.
     Vector velocity(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         return dt > 0 ? (1 / dt) * (scene::placed(w.after, x) - scene::placed(w.before, x)) : next_velocity(wall, x);
     }
     Vector next_velocity(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         return (1 / next) * (scene::placed(w.later, x) - scene::placed(w.after, x));
     }
     /// Where that is now; half-way along the chord, as soil is at mid-step.
-    Vector place(int wall, Vector x) const
+    Vector position(int wall, Vector x) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         const Vector after = scene::placed(w.after, x);
         return midway ? 0.5 * (scene::placed(w.before, x) + after) : after;
     }
     Vector turned(int wall, Vector normal) const
     {
-        const WallPlace& w = walls[std::size_t(wall)];
+        const WallPoses& w = walls[std::size_t(wall)];
         const Vector after = scene::turned(w.after, normal), n = midway ? scene::turned(w.before, normal) + after : after;
         return (1 / length(n)) * n;
     }
 };
 
-/// One stage of a step: a pass over all clusters, and the exchange of ghost rows before it.
+/// One stage of a step: a pass over all clusters, and the exchange of ghosts before it.
 struct Stage {
     const char* name;
-    std::size_t row_bytes; // of a ghost
+    std::size_t ghost_bytes; // of a ghost's record
     /// Floating-point operations of one directed pair (an fma counts two; square root, division, min and max one), and of
     /// the update of one particle; bytes of main memory that one particle's update moves: for the roofline.
     double flops_per_pair, flops_per_particle, bytes_per_particle;
@@ -128,7 +127,8 @@ public:
     virtual PassResult run(int stage, const StepInput&, std::span<const Index> clusters) = 0;
     /// After the last cluster of a stage.
     virtual void end_stage(int stage) = 0;
-    /// Ghost rows of a stage: that of an owned particle seen from another period (m), and back to its slot. Threads call them at once.
+    /// Ghosts of a stage, a record each: that of an owned particle seen from another period (m), and back to its slot.
+    /// Threads call them at once.
     virtual void pack(int stage, Index owned, Vector shift, std::byte* to) const = 0;
     virtual void unpack(int stage, Index slot, const std::byte* from) = 0;
 
@@ -139,8 +139,8 @@ public:
     virtual std::size_t bytes() const = 0;
 };
 
-/// Bytes of the ghost rows of one particle in a whole step.
-std::size_t row_bytes(const PairModel&);
+/// Bytes of the ghost records of one particle in a whole step.
+std::size_t ghost_bytes(const PairModel&);
 
 /// The cheapest compiled model that contains every pair term of the scene (whose "auto" effects are resolved).
 std::unique_ptr<PairModel> choose_model(const scene::Interactions&, Arithmetic);

@@ -3,7 +3,7 @@
 // that of time t^n: x, v, sigma, rho, and the acceleration a^n. A step of length dt is
 //
 //     v^{n+1/2} = v^n + dt/2 a^n,  x^{n+1} = x^n + dt v^{n+1/2}                                       move
-//     L = grad v^{n+1/2} at the places of mid-step; rho, sigma -> n+1; viscous force                  stage 0, "strain"
+//     L = grad v^{n+1/2} at the positions of mid-step; rho, sigma -> n+1; viscous force                  stage 0, "strain"
 //     a^{n+1} from sigma^{n+1} at x^{n+1} and that viscous force;  v^{n+1} = v^{n+1/2} + dt/2 a^{n+1}  stage 1, "force"
 //
 // The geometry of L must be that of mid-step: at x^{n+1} it makes an energy error of (dt/2) sigma : L.L, first order. A stage reads of
@@ -22,7 +22,7 @@ public:
     explicit Staggered(const scene::Interactions& s) : Base(s), stages_{Base::strain_stage(), Base::force_stage()} {}
     std::string name() const override { return "staggered, " + Base::lanes_name(); }
     std::span<const Stage> stages() const override { return stages_; }
-    std::size_t record_bytes() const override { return stages_[0].row_bytes + stages_[1].row_bytes; }
+    std::size_t record_bytes() const override { return stages_[0].ghost_bytes + stages_[1].ghost_bytes; }
     PassResult run(int stage, const StepInput& in, std::span<const Index> clusters) override
     {
         return stage == 0 ? Base::run_strain(in, clusters) : Base::run_force(in, clusters);

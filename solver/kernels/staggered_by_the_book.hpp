@@ -14,7 +14,7 @@
 //
 // A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
 // nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's. Where the wall of that face
-// moves, v_i less the velocity of the face takes the place of v_i, and its power counts apart.
+// moves, v_i less the velocity of the face stands for v_i, and its power counts apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/scene/height_field.hpp"
@@ -165,7 +165,7 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
             else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)]))
                 same->wall = part.wall, same->side = on.normal;
         }
-    // Of equally near ones that which looks up, then along x, then y: the order of walls and faces does not show.
+    // Of equally near ones that which faces up, then along x, then y: the order of walls and faces does not show.
     std::ranges::sort(all, {}, [&](const Face& f) { return f.depth - least * dot(f.normal, {0.1, 0.01, 1}); });
     return all;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghost rows and the walls. A stage reads
+// Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghosts and the walls. A stage reads
 // of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice.
 #include "solver/kernels/cluster_pass.hpp"
@@ -114,12 +114,13 @@ public:
     void place_walls(const WallStep& step) override
     {
         for (const auto& p : moving_points_) {
-            const Vector x = step.place(p.wall, p.x);
+            const Vector x = step.position(p.wall, p.x);
             auto& to = walls_[p.record];
             to.x[p.point] = fixed_(x.x), to.y[p.point] = fixed_(x.y), to.z[p.point] = fixed_(x.z);
         }
         for (const auto& f : moving_faces_) {
-            const Vector x = step.place(f.own, f.x), foot = step.place(f.wall, f.face.foot(f.x)), n = step.turned(f.wall, f.face.normal);
+            const Vector x = step.position(f.own, f.x), foot = step.position(f.wall, f.face.foot(f.x)),
+                         n = step.turned(f.wall, f.face.normal);
             const Vector v = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.velocity(w, at); });
             const Vector next = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.next_velocity(w, at); });
             auto& to = walls_[f.record].faces[f.number];

@@ -46,7 +46,7 @@ protected:
         S now, next;
     };
     template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
-    using Lane = Row<W>;
+    using Wide = WideLanes<W>;
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
 
@@ -74,13 +74,13 @@ private:
         }
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
         const auto near = Below::near(i, in, cluster, kinematics_.data());
-        StrainSums<Lane> sums;
+        StrainSums<Wide> sums;
         sum_strain(in, i, near, sums);
-        StrainWalls<Lane> walls{};
+        StrainWalls<Wide> walls{};
         const auto runs = in.lists->walls(cluster);
         if (!runs.empty()) {
             if (Below::walls_move()) {
-                ViscousPower<Lane> power{};
+                ViscousPower<Wide> power{};
                 sum_wall_strain<true>(in, i, runs, walls, &power);
                 if constexpr (M::viscous)
                     Below::for_each_register(i, [&](const Lanes& lanes) { book_viscous_power(in, power, lanes, tally); });
@@ -90,18 +90,18 @@ private:
             i, [&](const Lanes& lanes) __attribute__((always_inline)) { update_strain(in, sums, walls, !runs.empty(), lanes, tally); });
     }
     /// What viscosity takes is less by what walls do through it.
-    [[gnu::noinline]] void book_viscous_power(const StepInput& in, const ViscousPower<Lane>& rows, const Lanes& lanes,
+    [[gnu::noinline]] void book_viscous_power(const StepInput& in, const ViscousPower<Wide>& wide, const Lanes& lanes,
                                               Tally<U>& tally) const
     {
         const auto& was = std::as_const(*in.particles);
-        const auto power = lanes_at<U, ViscousPower<U>, ViscousPower<Lane>, W>(rows, lanes.first);
+        const auto power = lanes_at<U, ViscousPower<U>, ViscousPower<Wide>, W>(wide, lanes.first);
         const LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
         const U rho = was[field::density].template load<U>(lanes.at), mass = U(volume_) * soil.rho0;
         const U watts = (-mass * U(scale_) / rho) * (mass / rho);
         Below::book_work_of_walls(in, lanes, watts * power.now, watts * power.next, tally.energy.viscous, tally.later.viscous, tally);
     }
 
-    KUZURE_INLINE void sum_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, StrainSums<Lane>& out) const
+    KUZURE_INLINE void sum_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, StrainSums<Wide>& out) const
     {
         const Kinematics<T>* records = kinematics_.data();
         const bool one_soil = in.soils.size() == 1;
@@ -139,8 +139,8 @@ private:
     }
 
     template <bool moving>
-    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, StrainWalls<Lane>& out,
-                                           ViscousPower<Lane>* power_out) const
+    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, StrainWalls<Wide>& out,
+                                           ViscousPower<Wide>* power_out) const
     {
         const V half_dt(T(0.5 * in.dt / unit_));
         const Vec3<V> back{half_dt * i.v.x, half_dt * i.v.y, half_dt * i.v.z};
@@ -210,13 +210,13 @@ private:
         p[field::acceleration].store(lanes.at, next.viscous, lanes.n);
     }
 
-    KUZURE_INLINE void update_strain(const StepInput& in, const StrainSums<Lane>& rows, const StrainWalls<Lane>& wall_rows, bool walled,
-                                     const Lanes& lanes, Tally<U>& tally)
+    KUZURE_INLINE void update_strain(const StepInput& in, const StrainSums<Wide>& soil_sums, const StrainWalls<Wide>& wall_sums,
+                                     bool walled, const Lanes& lanes, Tally<U>& tally)
     {
         auto& p = *in.particles;
         const auto& was = std::as_const(p);
         const U one(1.0), zero(0.0), half(0.5), factor(scale_), dt(in.dt), half_dt = half * dt;
-        const auto sums = lanes_at<U, StrainSums<U>, StrainSums<Lane>, W>(rows, lanes.first);
+        const auto sums = lanes_at<U, StrainSums<U>, StrainSums<Wide>, W>(soil_sums, lanes.first);
         LaneSoil<U> soil = soil_of<U>(in.soils, was[field::soil].column[0], lanes);
         const Sym3<U> sigma = was[field::stress].template load<U>(lanes.at);
         const U rho = was[field::density].template load<U>(lanes.at);
@@ -229,7 +229,7 @@ private:
         Mat3<U> at_walls{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
         U feels_wall = zero;
         if (walled) {
-            const auto w = lanes_at<U, StrainWalls<U>, StrainWalls<Lane>, W>(wall_rows, lanes.first);
+            const auto w = lanes_at<U, StrainWalls<U>, StrainWalls<Wide>, W>(wall_sums, lanes.first);
             const U volume = U(volume_) * soil.rho0 / rho; // a wall particle has the soil's
             at_walls = wall_gradient(in, w, lanes, -factor * volume);
             feels_wall = select(less(zero, abs(w.walled)), one, zero);
@@ -330,20 +330,21 @@ private:
     }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
     {
-        double rows[7][width<U>];
+        double fields[7][width<U>];
         const U columns[7] = {
             next.sigma.xx, next.sigma.yy, next.sigma.zz, next.sigma.xy, next.sigma.yz, next.sigma.xz, U(volume_) * soil.rho0 / next.rho};
-        for (int k = 0; k < 7; ++k) store(rows[k], columns[k]);
+        for (int k = 0; k < 7; ++k) store(fields[k], columns[k]);
         const std::int32_t* activity = in.sleep == SleepStage::Off ? nullptr : std::as_const(*in.particles)[field::activity].column[0];
         for (int k = 0; k < lanes.n; ++k) {
             Stresses<T>& r = stresses_[lanes.at + k];
-            r.xx = T(rows[0][k]), r.yy = T(rows[1][k]), r.zz = T(rows[2][k]);
-            r.xy = T(rows[3][k]), r.yz = T(rows[4][k]), r.xz = T(rows[5][k]);
-            r.volume = T(rows[6][k]);
+            r.xx = T(fields[0][k]), r.yy = T(fields[1][k]), r.zz = T(fields[2][k]);
+            r.xy = T(fields[3][k]), r.yz = T(fields[4][k]), r.xz = T(fields[5][k]);
+            r.volume = T(fields[6][k]);
             if (activity) r.awake = T(activity[lanes.at + k] == std::int32_t(Activity::Moves));
             if constexpr (M::tensile)
-                tension_[lanes.at + k] = make_tension<T>(Stress{rows[0][k], rows[1][k], rows[2][k], rows[3][k], rows[4][k], rows[5][k]},
-                                                         model_.artificial_stress.epsilon);
+                tension_[lanes.at + k] =
+                    make_tension<T>(Stress{fields[0][k], fields[1][k], fields[2][k], fields[3][k], fields[4][k], fields[5][k]},
+                                    model_.artificial_stress.epsilon);
         }
     }
 };

@@ -49,7 +49,7 @@ void sort_heights(Height* begin, Height* end)
     }
 }
 
-/// Turns counts of columns by thread into the places where each thread's particles begin.
+/// Turns counts of columns by thread into the indices where each thread's particles begin.
 void begin_columns(std::vector<std::vector<Index>>& histogram, std::vector<Index>& start, std::size_t count)
 {
     Index at = 0;

@@ -25,10 +25,10 @@ struct Columns {
 /// Points of one set sorted into the global order.
 struct ColumnSort {
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0; // columns [x0, x0 + nx) x [y0, y0 + ny)
-    std::vector<Index> start;                    // nx * ny + 1: first sorted place of each column, y slowest
-    Array<Index> order;                          // sorted place -> index in the input
+    std::vector<Index> start;                    // nx * ny + 1: first sorted index of each column, y slowest
+    Array<Index> order;                          // sorted index -> index in the input
 
-    /// Places of column (cx, cy); empty outside the range.
+    /// Sorted indices of column (cx, cy); empty outside the range.
     std::pair<Index, Index> range(std::int32_t cx, std::int32_t cy) const
     {
         const std::int32_t x = cx - x0, y = cy - y0;

@@ -1,5 +1,6 @@
 #include "solver/neighbours/lists.hpp"
 #include "solver/core/ensure.hpp"
+#include "solver/core/simd.hpp"
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -106,7 +107,7 @@ struct Cluster {
     }
 };
 
-/// For each pattern of eight hits: the places of those in front, and how many.
+/// For each pattern of eight hits: the indices of those in front, and how many.
 struct Compress {
     std::uint8_t at[256][8], count[256];
     constexpr Compress() : at{}, count{}

@@ -1,17 +1,17 @@
 #pragma once
-// Pair sums of one cluster: a struct a term, of lanes while the loop runs, of rows of doubles for walls and update.
+// Pair sums of one cluster: a struct a term, of lanes while the loop runs, of doubles, widened, for walls and update.
 #include "solver/core/simd.hpp"
 #include <cstring>
 #include <type_traits>
 
 namespace kuzure {
 
-/// Doubles that a row of W lanes holds: whole registers of the update, which reads beyond the lanes of a narrow cluster.
-template <int W> inline constexpr int row_length = W == 1 || W > width<Native<double>> ? W : width<Native<double>>;
+/// Doubles in memory for W lanes: whole registers of the update, which reads beyond the lanes of a narrow cluster.
+template <int W> inline constexpr int wide_length = W == 1 || W > width<Native<double>> ? W : width<Native<double>>;
 
 /// One sum of each of W particles.
-template <int W> struct alignas(8 * row_length<W> < 64 ? 8 * row_length<W> : 64) Row {
-    double at[row_length<W>];
+template <int W> struct alignas(8 * wide_length<W> < 64 ? 8 * wide_length<W> : 64) WideLanes {
+    double at[wide_length<W>];
 };
 
 /// The sums of several terms, one member after the other.
@@ -41,22 +41,22 @@ template <class V> KUZURE_INLINE void store_wide(double* p, V a)
     }
 }
 
-/// Sums of lanes as rows of doubles: member by member, whatever the terms.
-template <class V, class Lanes, class Rows> KUZURE_INLINE void widen(const Lanes& from, Rows& to)
+/// Sums of lanes as doubles in memory: member by member, whatever the terms.
+template <class V, class Lanes, class Wide> KUZURE_INLINE void widen(const Lanes& from, Wide& to)
 {
     constexpr int members = sizeof(Lanes) / sizeof(V);
-    static_assert(sizeof(Lanes) == members * sizeof(V) && sizeof(Rows) == members * sizeof(Row<width<V>>));
+    static_assert(sizeof(Lanes) == members * sizeof(V) && sizeof(Wide) == members * sizeof(WideLanes<width<V>>));
     const V* v = reinterpret_cast<const V*>(&from);
-    auto* rows = reinterpret_cast<Row<width<V>>*>(&to);
-    for (int k = 0; k < members; ++k) store_wide(rows[k].at, v[k]);
+    auto* wide = reinterpret_cast<WideLanes<width<V>>*>(&to);
+    for (int k = 0; k < members; ++k) store_wide(wide[k].at, v[k]);
 }
-/// Lanes `first` and on of the rows of any struct of rows, as the same struct of registers.
-template <class U, class Struct, class Rows, int W> KUZURE_INLINE Struct lanes_at(const Rows& rows, int first)
+/// Lanes `first` and on of any struct of WideLanes, as the same struct of registers.
+template <class U, class Struct, class Wide, int W> KUZURE_INLINE Struct lanes_at(const Wide& wide, int first)
 {
-    constexpr int members = sizeof(Rows) / sizeof(Row<W>);
+    constexpr int members = sizeof(Wide) / sizeof(WideLanes<W>);
     static_assert(sizeof(Struct) == members * sizeof(U));
     Struct s;
-    const auto* from = reinterpret_cast<const Row<W>*>(&rows);
+    const auto* from = reinterpret_cast<const WideLanes<W>*>(&wide);
     U* to = reinterpret_cast<U*>(&s);
     for (int k = 0; k < members; ++k) to[k] = load<U>(from[k].at + first);
     return s;
@@ -65,9 +65,9 @@ template <class U, class Struct, class Rows, int W> KUZURE_INLINE Struct lanes_a
 /// One number a lane, or one struct of lanes, from what `of(lane)` gives for each.
 template <class U, class Of> KUZURE_INLINE U lane_by_lane(Of of)
 {
-    double row[width<U>];
-    for (int k = 0; k < width<U>; ++k) row[k] = of(k);
-    return load<U>(row);
+    double lane[width<U>];
+    for (int k = 0; k < width<U>; ++k) lane[k] = of(k);
+    return load<U>(lane);
 }
 template <template <class> class Struct, class U, class Of> KUZURE_INLINE Struct<U> lane_by_lane(Of of)
 {

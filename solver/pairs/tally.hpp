@@ -1,7 +1,7 @@
 #pragma once
 // What a pass reports besides the state: energies that leave the mechanical ledger, and maxima. One member list serves the
 // lanes of a register, threads, ranks and the checkpoint.
-#include "solver/core/simd.hpp"
+#include "solver/core/scalar.hpp"
 #include <array>
 #include <tuple>
 #include <utility>

@@ -5,7 +5,7 @@
 //     grad_i W_ij = scale * F * (x_i - x_j)
 //
 // so that the constant is taken out of the sums. F is exactly zero beyond the support. Only a kernel that `divides` is given 1/r.
-#include "solver/core/simd.hpp"
+#include "solver/core/scalar.hpp"
 #include <numbers>
 
 namespace kuzure {

@@ -32,8 +32,8 @@ std::vector<BlockWork> block_work(const Scene& scene, const Domain& domain, cons
 }
 } // namespace
 
-Balance::Balance(const Comm& comm, Domain& domain, double reach, double row_bytes, int recut_every)
-    : comm_(comm), domain_(domain), halo_{reach, row_bytes}, recut_every_(recut_every)
+Balance::Balance(const Comm& comm, Domain& domain, double reach, double ghost_bytes, int recut_every)
+    : comm_(comm), domain_(domain), halo_{reach, ghost_bytes}, recut_every_(recut_every)
 {
 }
 

@@ -11,7 +11,7 @@ namespace kuzure {
 class Balance {
 public:
     /// `recut_every`: cut anew at every so many list rebuilds, needed or not; 0: when it pays. Ghosts reach `reach` m.
-    Balance(const Comm&, Domain&, double reach, double row_bytes, int recut_every);
+    Balance(const Comm&, Domain&, double reach, double ghost_bytes, int recut_every);
 
     /// The first cut, by counts of the scene's start: each rank counts a share of the blocks; no rank keeps a particle yet. Collective.
     void cut_start(const Scene&, const scene::Filling&, Timers&);

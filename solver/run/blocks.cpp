@@ -78,8 +78,8 @@ public:
         std::int64_t n = 0;
         for (int i = from[0]; i <= to[0]; ++i)
             for (int j = from[1]; j <= to[1]; ++j) {
-                const std::size_t row = (std::size_t(i) * n_[1] + j) * n_[2];
-                for (std::size_t k = first_[row + from[2]]; k < first_[row + to[2] + 1]; ++k) {
+                const std::size_t line = (std::size_t(i) * n_[1] + j) * n_[2];
+                for (std::size_t k = first_[line + from[2]]; k < first_[line + to[2] + 1]; ++k) {
                     const Vector d = x_[k] - x;
                     n += dot(d, d) < support2;
                 }
@@ -185,21 +185,21 @@ struct BlockSoil::Sight {
 };
 
 /// Counts the particles of one block that are near the soil of some others.
-class BlockSoil::NearRows {
+class BlockSoil::NearCounts {
 public:
-    NearRows(const BlockSoil& soil, const Block& b, double safe)
-        : soil_(soil), block_(b), reach2_(safe * safe), like_(soil.next_block_holds(safe) ? soil.pattern_key(b) : std::string())
+    NearCounts(const BlockSoil& soil, const Block& b, double safe)
+        : soil_(soil), block_(b), reach2_(safe * safe), pattern_(soil.next_block_holds(safe) ? soil.pattern_key(b) : std::string())
     {
     }
     std::int64_t near(std::span<const Sight> sights)
     {
         std::string key;
-        if (!like_.empty()) {
+        if (!pattern_.empty()) {
             std::uint32_t mask = 0;
             for (const Sight& s : sights) mask |= 1u << ((s.way[0] + 1) * 9 + (s.way[1] + 1) * 3 + s.way[2] + 1);
-            key = fmt::format("{}|{}", mask, like_);
+            key = fmt::format("{}|{}", mask, pattern_);
             const std::lock_guard lock(soil_.mutex_);
-            if (const auto known = soil_.rows_of_.find(key); known != soil_.rows_of_.end()) return known->second;
+            if (const auto known = soil_.known_counts_.find(key); known != soil_.known_counts_.end()) return known->second;
         }
         if (points_.empty()) soil_.points(block_, points_);
         find_boxes(sights);
@@ -209,7 +209,7 @@ public:
             n += std::ranges::any_of(sights, [&](const Sight& s) { return squared_distance(x, none, boxes_.at(s.way)) <= reach2_; });
         if (!key.empty()) {
             const std::lock_guard lock(soil_.mutex_);
-            soil_.rows_of_[key] = n;
+            soil_.known_counts_[key] = n;
         }
         return n;
     }
@@ -233,7 +233,7 @@ private:
     const BlockSoil& soil_;
     const Block& block_;
     double reach2_;
-    std::string like_; // blocks of this pattern have the same rows; empty where that is not so
+    std::string pattern_; // blocks of this pattern have the same counts; empty where that is not so
     std::vector<Vector> points_;
     std::map<Block, Bounds> boxes_; // by way
 };
@@ -255,15 +255,15 @@ BlockSoil::HaloDemand BlockSoil::halo_demand(const Block& b, int mine, const std
     if (around_me.empty()) return result;
     std::ranges::stable_sort(around_me, {}, [](const Sight& s) { return std::pair(s.owner, s.period_shift); });
 
-    NearRows rows(*this, b, safe);
+    NearCounts counts(*this, b, safe);
     for (std::size_t from = 0, to; from < around_me.size(); from = to) {
         const Sight& first = around_me[from];
         for (to = from; to < around_me.size() && around_me[to].owner == first.owner && around_me[to].period_shift == first.period_shift;)
             ++to;
-        const std::int64_t n = rows.near(std::span(around_me).subspan(from, to - from));
+        const std::int64_t n = counts.near(std::span(around_me).subspan(from, to - from));
         if (n > 0) result.by.push_back({first.owner, first.period_shift, n});
     }
-    result.seen = rows.near(around_me);
+    result.seen = counts.near(around_me);
     return result;
 }
 
@@ -282,7 +282,7 @@ std::vector<Block> StartSoil::blocks() const
         };
         Block lo = corner(inside(box.low)), hi = corner(inside(box.high)), at;
         for (int a = 0; a < 3; ++a) {
-            // Across a period the corners may have changed places.
+            // Across a period the corners may have been exchanged.
             if (lo[a] > hi[a]) lo[a] = least[a], hi[a] = most[a];
         }
         for (at[0] = lo[0]; at[0] <= hi[0]; ++at[0])

@@ -53,7 +53,7 @@ public:
     struct Receiver {
         int owner;
         std::array<std::int8_t, 3> period_shift; // periods between the two
-        std::int64_t rows;                       // particles within reach of it
+        std::int64_t particles;                  // particles within reach of it
     };
     struct HaloDemand {
         std::vector<Receiver> by;
@@ -65,7 +65,7 @@ public:
     const BlockSpace& space() const { return space_; }
 
 protected:
-    /// A text that two blocks share only if they and the blocks around them hold soil and walls in the same places relative
+    /// A text that two blocks share only if they and the blocks around them hold soil and walls at the same points relative
     /// to the block; empty where that is undefined.
     virtual std::string pattern_key(const Block&) const { return {}; }
 
@@ -75,7 +75,7 @@ protected:
 
 private:
     struct Sight;
-    class NearRows;
+    class NearCounts;
     /// Visits the blocks around one, itself among them: visit(wrapped block, way there in blocks, periods crossed).
     template <class Visit> void around(const Block&, double reach, Visit visit) const;
     /// One block each way holds everything within reach.
@@ -84,7 +84,7 @@ private:
 
     mutable std::mutex mutex_;
     mutable std::map<std::string, StepWork> work_of_;
-    mutable std::map<std::string, std::int64_t> rows_of_;
+    mutable std::map<std::string, std::int64_t> known_counts_;
 };
 
 /// The soil of a scene's start. Blocks that look alike are counted once, so any number of blocks costs little.

@@ -64,7 +64,7 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
         lists_.build(columns_, owned, around, walls_, reach_, model.cluster_width());
         model.make_records(p, soils, ghost_soil_);
     });
-    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its place and record.
+    // Of an entry that is kept: three differences, their squares and two sums; four bytes. Of a particle: its position and record.
     const auto entries = double(lists_.entries() + lists_.wall_entries());
     timers.did(Phase::Lists, 8 * entries, 4 * entries + double(p.size()) * double(24 + model.record_bytes() / 2));
     pruned_margin_ = 0;
@@ -73,9 +73,9 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
 
 void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model)
 {
-    std::vector<std::size_t> rows;
-    for (const Stage& s : model.stages()) rows.push_back(s.row_bytes);
-    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), rows);
+    std::vector<std::size_t> ghost_bytes;
+    for (const Stage& s : model.stages()) ghost_bytes.push_back(s.ghost_bytes);
+    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), ghost_bytes);
     const auto arrived = halo_->ghosts(p);
     const auto n = Index(arrived.size());
     Array<double> x(n), y(n), z(n);
@@ -92,7 +92,7 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
         ghost_soil_[k] = arrived[from].soil;
         slot[from] = k;
     }
-    halo_->place(slot);
+    halo_->assign_slots(slot);
 }
 
 void Layout::renew_walls(const Particles& p, PairModel& model)

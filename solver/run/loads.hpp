@@ -23,8 +23,8 @@ void give_to_loads(const Team&, const Scene&, const scene::Filling&, std::span<c
 /// Takes the soil of these loads from them.
 void take_from_loads(std::span<const int> loads, Particles&);
 /// Collective. field::load_push of these loads' particles, from the area (m^2) of their free faces, against its normal, to the force (N)
-/// that the load says. Where it has a normal, the area that is seen along it is shared among the soil at that place in the proportion of
-/// those.
+/// that the load says. Where it has a normal, the area that is seen along it is shared among the soil at that point
+/// in the proportion of those.
 void set_pushes(const Team&, const Scene&, std::span<const int> loads, Particles&);
 
 /// True where some load has a plate, now or later.

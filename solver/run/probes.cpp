@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::size_t numbers = 16; // of one probe: count, weight, position, velocity, density, stress, plastic strain
 
-/// From a place to the nearest image of another, m.
+/// From a point to the nearest image of another, m.
 Vector nearest_way(const Scene& scene, Vector from, Vector to)
 {
     Vector way = to - from;

@@ -8,7 +8,7 @@
 
 namespace kuzure {
 
-/// Of a place: the mean of the soil in reach, by volume and kernel; of a particle: its own; of a body: the mean of its particles by mass.
+/// Of a point: the mean of the soil in reach, by volume and kernel; of a particle: its own; of a body: the mean of its particles by mass.
 /// Not numbers where there is none.
 struct Reading {
     std::string name;

@@ -53,7 +53,7 @@ double CutShare::ghost_share() const
     return double(ghosts) / double(std::max<std::int64_t>(1, sum().particles));
 }
 
-CutShare share_out(const BlockSoil& soil, int ranks, double reach, double row_bytes, Method method)
+CutShare share_out(const BlockSoil& soil, int ranks, double reach, double ghost_bytes, Method method)
 {
     CutShare s;
     const double start = omp_get_wtime();
@@ -61,7 +61,7 @@ CutShare share_out(const BlockSoil& soil, int ranks, double reach, double row_by
     s.weigh_seconds = omp_get_wtime() - start;
 
     const double cutting = omp_get_wtime();
-    const BlockCut cut = cut_blocks(weighed.listed, {}, soil.space().grid(reach, row_bytes), ranks, method);
+    const BlockCut cut = cut_blocks(weighed.listed, {}, soil.space().grid(reach, ghost_bytes), ranks, method);
     s.cut_seconds = omp_get_wtime() - cutting;
 
     const BlockGraph& g = cut.graph;
@@ -79,23 +79,23 @@ CutShare share_out(const BlockSoil& soil, int ranks, double reach, double row_by
 #pragma omp parallel for schedule(dynamic, 16)
     for (int b = 0; b < g.size(); ++b) demand[b] = soil.halo_demand(g.block[b], cut.owner[b], owner_of, reach);
 
-    std::vector<HaloMessage> rows;
+    std::vector<HaloMessage> parts;
     for (int b = 0; b < g.size(); ++b) {
         const int mine = cut.owner[b];
         s.rank[mine].work.add(weighed.work[b]);
         s.rank[mine].seen += demand[b].seen;
         for (const auto& w : demand[b].by) {
-            s.rank[w.owner].ghosts += w.rows;
-            if (w.owner != mine) rows.push_back({mine, w.owner, w.rows});
+            s.rank[w.owner].ghosts += w.particles;
+            if (w.owner != mine) parts.push_back({mine, w.owner, w.particles});
         }
     }
-    std::ranges::sort(rows, {}, [](const HaloMessage& r) { return std::pair(r.from, r.to); });
-    for (std::size_t k = 0, to; k < rows.size(); k = to) {
+    std::ranges::sort(parts, {}, [](const HaloMessage& r) { return std::pair(r.from, r.to); });
+    for (std::size_t k = 0, to; k < parts.size(); k = to) {
         std::int64_t sum = 0;
-        for (to = k; to < rows.size() && rows[to].from == rows[k].from && rows[to].to == rows[k].to; ++to) sum += rows[to].rows;
-        s.message.push_back({rows[k].from, rows[k].to, sum});
-        s.rank[rows[k].from].rows += sum;
-        ++s.rank[rows[k].from].messages;
+        for (to = k; to < parts.size() && parts[to].from == parts[k].from && parts[to].to == parts[k].to; ++to) sum += parts[to].ghosts;
+        s.message.push_back({parts[k].from, parts[k].to, sum});
+        s.rank[parts[k].from].sent += sum;
+        ++s.rank[parts[k].from].messages;
     }
     return s;
 }

@@ -18,13 +18,13 @@ struct RankShare {
     StepWork work;
     std::int64_t seen = 0;   // own particles that others need: their clusters wait for ghosts
     std::int64_t ghosts = 0; // own periodic images included
-    std::int64_t rows = 0;   // sent over MPI
+    std::int64_t sent = 0;   // ghosts over MPI
     int messages = 0;        // sent over MPI
 };
 /// One message of a step.
 struct HaloMessage {
     int from, to;
-    std::int64_t rows;
+    std::int64_t ghosts;
 };
 struct CutShare {
     int blocks = 0;              // that hold soil
@@ -41,6 +41,6 @@ struct CutShare {
     double ghost_share() const;
 };
 /// Cuts as a run on so many ranks would: of a start, or of a state. The blocks must be those of block_space() for as many ranks.
-CutShare share_out(const BlockSoil&, int ranks, double reach, double row_bytes, Method = Method::Metis);
+CutShare share_out(const BlockSoil&, int ranks, double reach, double ghost_bytes, Method = Method::Metis);
 
 } // namespace kuzure

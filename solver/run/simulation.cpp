@@ -1,4 +1,5 @@
 #include "solver/run/simulation.hpp"
+#include "solver/core/simd.hpp"
 #include "solver/run/loads.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/loads.hpp"
@@ -14,7 +15,7 @@ Simulation::Simulation(const Comm& comm, const Scene& scene, RunOptions options,
       filling_(options_.filling ? std::move(*options_.filling) : scene::Filling(scene)), soils_(materials_of(scene)),
       model_(choose_model(scene, options_.arithmetic)), domain_(comm, block_space(scene, filling_, comm.size(), options_.blocks_per_rank)),
       layout_(scene_, filling_, low_corner(filling_, scene)),
-      balance_(comm, domain_, layout_.reach(), double(row_bytes(*model_)), options_.recut_every), moving_(scene::moving_walls(scene)),
+      balance_(comm, domain_, layout_.reach(), double(ghost_bytes(*model_)), options_.recut_every), moving_(scene::moving_walls(scene)),
       watch_(comm, scene_, filling_, soils_), wall_forces_(scene_, soils_, layout_), clock_(clock)
 {
 }
@@ -202,7 +203,7 @@ PassResult Simulation::run_stage(int stage, const StepInput& in)
     Halo& halo = layout_.halo();
     const ClusterLists& lists = layout_.lists();
     timers_.timed(Phase::HaloBegin, [&] {
-        halo.begin(s.row_bytes, [&](Index owned, Vector shift, std::byte* to) { model_->pack(stage, owned, shift, to); });
+        halo.begin(s.ghost_bytes, [&](Index owned, Vector shift, std::byte* to) { model_->pack(stage, owned, shift, to); });
     });
     PassResult result = timers_.timed(Phase::Interior, [&] {
         // MPI moves long messages only when it is called: in a few portions of the work, none smaller than threads like.
@@ -219,7 +220,7 @@ PassResult Simulation::run_stage(int stage, const StepInput& in)
         return all;
     });
     count_work(Phase::Interior, s, result.pairs, lists.interior().size());
-    timers_.timed(Phase::HaloWait, [&] { halo.arrive([&](Index slot, const std::byte* row) { model_->unpack(stage, slot, row); }); });
+    timers_.timed(Phase::HaloWait, [&] { halo.arrive([&](Index slot, const std::byte* record) { model_->unpack(stage, slot, record); }); });
     const PassResult rim = timers_.timed(Phase::Rim, [&] { return model_->run(stage, in, lists.rim()); });
     count_work(Phase::Rim, s, rim.pairs, lists.rim().size());
     model_->end_stage(stage);
@@ -392,7 +393,7 @@ Clock Simulation::clock() const
 std::int64_t Simulation::halo_bytes() const
 {
     const auto& halo = layout_.made_halo();
-    return halo ? halo->rows_per_refresh() * std::int64_t(row_bytes(*model_)) : 0;
+    return halo ? halo->records_per_refresh() * std::int64_t(ghost_bytes(*model_)) : 0;
 }
 int Simulation::halo_messages() const
 {

@@ -24,8 +24,8 @@ struct RunOptions {
     bool settles = false;                       // this is a settling run itself
     /// Called on every rank before each step of the settling run; true on any asks it to stop.
     std::function<bool(const Settling&)> settling = {};
-    /// The soil that the run starts from instead of the scene's filling, each id once, on any rank: place, velocity, density, stress, what
-    /// it remembers. Displacements count from there.
+    /// The soil that the run starts from instead of the scene's filling, each id once, on any rank: position, velocity, density, stress,
+    /// what it remembers. Displacements count from there.
     std::optional<Particles> start = {};
 };
 
@@ -111,7 +111,7 @@ private:
     void prepare();
     /// This rank's share of the soil at t = 0, where it is to be. Collective.
     void start_soil();
-    /// `sort_anew`: at the places of now, which are those of a time (s); else at those of the last sort.
+    /// `sort_anew`: at the positions of now, which are those of a time (s); else at those of the last sort.
     void rebuild(bool sort_anew, double time, double way = 0);
     StepInput step_input(double dt, double next);
     /// The forces of a state that no step led to, where steps need them first. Collective.

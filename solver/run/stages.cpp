@@ -83,9 +83,9 @@ void Simulation::change_bodies(const Scene& before)
         model_->start(fresh);
         std::vector<Index> all(std::size_t(fresh.size()));
         std::iota(all.begin(), all.end(), 0);
-        std::vector<std::byte> rows;
-        fresh.pack(all, rows);
-        particles_.unpack(rows);
+        std::vector<std::byte> bytes;
+        fresh.pack(all, bytes);
+        particles_.unpack(bytes);
     }
     if (any(goes) || any(comes)) balance_.cut_state(scene_, particles_, layout_, false, [] {});
 }
@@ -149,12 +149,12 @@ void Simulation::move_walls(double time)
 void Simulation::place_walls(const StepInput& in, bool midway)
 {
     const double begin = clock_.time, end = begin + in.dt;
-    std::vector<WallPlace> places(scene_.walls.size());
+    std::vector<WallPoses> poses(scene_.walls.size());
     for (const int w : moving_) {
         const auto since = [&](double time) { return scene::then(scene::inverse(pose(w, clock_.sorted_time)), pose(w, time)); };
-        places[std::size_t(w)] = {since(begin), since(end), since(end + in.next)};
+        poses[std::size_t(w)] = {since(begin), since(end), since(end + in.next)};
     }
-    model_->place_walls({places, in.dt, in.next, midway});
+    model_->place_walls({poses, in.dt, in.next, midway});
     if (!midway) move_walls(end);
 }
 

@@ -91,8 +91,8 @@ template <class Visit> void WallForces::share(std::span<const Seen> seen, Vector
     double sight = 0;
     for (const auto& s : seen) together = together + s.traction, all_bear = all_bear + s.bears, sight += s.area;
     const double square = dot(together, together), scale = square > 0 ? dot(force, together) / square : 0;
-    const Vector rest = force - scale * together, loads = solved(plus_isotropic(all_bear, 1e-9 * sight), rest);
-    const Vector left = rest - all_bear * loads; // what none of them can bear
+    const Vector remainder = force - scale * together, loads = solved(plus_isotropic(all_bear, 1e-9 * sight), remainder);
+    const Vector left = remainder - all_bear * loads; // what none of them can bear
     for (const auto& s : seen) give(s, scale * s.traction + s.bears * loads + (s.area / sight) * left);
 }
 

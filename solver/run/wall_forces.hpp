@@ -32,10 +32,10 @@ public:
 
 private:
     struct Seen;
-    /// visit(number in walls_, place, force on the wall) for every particle of a cluster and every named wall in its reach.
+    /// visit(number in walls_, position, force on the wall) for every particle of a cluster and every named wall in its reach.
     template <class Visit> void for_each_force(const Particles&, Index cluster, Visit visit) const;
     /// A particle in reach of several walls is shared among them by what its stress does to the faces of each, as the pair loop has it; the
-    /// rest, of viscosity and friction, by how much it sees of each and which way that can bear.
+    /// remainder, of viscosity and friction, by how much it sees of each and which way that can bear.
     template <class Visit> void share(std::span<const Seen>, Vector x, Vector force, Visit visit) const;
     /// Adds what a particle at x sees of one wall point.
     void see(Index wall, Index point, Vector x, const Stress&, std::vector<Seen>&) const;

@@ -58,9 +58,9 @@ template <class Visit> void Columns::for_each_image(Vector x, double reach, Visi
         for (int j = 0; j < ny; ++j) visit(Vector{along_x[std::size_t(i)], along_y[std::size_t(j)], 0});
 }
 
-/// True if a stack rests on another at x, its foot above or below the other's top (m). Cells end at a box's faces; at other shapes' they
+/// True if a stack stands on another at x, its foot above or below the other's top (m). Cells end at a box's faces; at other shapes' they
 /// end up to half a spacing before or behind, and a thin wall of such a shape may stand in what remains.
-bool Columns::rests(int upper, double foot, int lower, double top, Vector x) const
+bool Columns::stands_on(int upper, double foot, int lower, double top, Vector x) const
 {
     const double dx = scene_.space.spacing, gap = foot - top;
     const auto is_box = [&](int body) { return std::holds_alternative<Box>(scene_.bodies[std::size_t(body)].shape); };
@@ -95,7 +95,7 @@ Columns::Above Columns::above(Vector x, int body) const
     parts.push_back(own);
     std::sort(others.begin(), others.end(), [](const Part& a, const Part& b) { return a.foot < b.foot; });
     for (Part p : others) {
-        const auto carries = [&](const Part& q) { return rests(p.body, p.foot, q.body, q.top, x); };
+        const auto carries = [&](const Part& q) { return stands_on(p.body, p.foot, q.body, q.top, x); };
         if (std::none_of(parts.begin(), parts.end(), carries)) continue;
         // Side by side they share the column's width, whose cells on shifted lattices may overlap.
         const double lowest = p.foot + 0.5 * dx;

@@ -10,8 +10,8 @@ inline bool rests(const Body& b) { return b.stress == InitialStress::AtRest; }
 
 /// Soil above points of soil, in columns one spacing wide.
 ///
-/// A column carries the stacks of particles (Stack) that rest on it, each by the share of the column's width that it covers:
-/// 1 on the same lattice, less on a shifted one. What rests on those counts likewise, and so on up to the first gap, be it air or a
+/// A column carries the stacks of particles (Stack) that stand on it, each by the share of the column's width that it covers:
+/// 1 on the same lattice, less on a shifted one. What stands on those counts likewise, and so on up to the first gap, be it air or a
 /// wall. What stands beside the column counts nothing, though cells of shifted lattices overlap a little there.
 class Columns {
 public:
@@ -21,12 +21,12 @@ public:
         double mass;    // kg/m^2
         double surface; // m, height of the highest soil that counts
     };
-    /// Above a particle of a body at its place (m).
+    /// Above a particle of a body at its position (m).
     Above above(Vector x, int body) const;
 
 private:
     template <class Visit> void for_each_image(Vector x, double reach, Visit visit) const;
-    bool rests(int upper, double foot, int lower, double top, Vector x) const;
+    bool stands_on(int upper, double foot, int lower, double top, Vector x) const;
 
     const Scene& scene_;
     const Filling& filling_;

@@ -27,10 +27,9 @@ void check_maps(const Scene& scene, const Filling& filling, Rules& rules)
             rules.error("maps.limits", text("expected each limit once, found {} again; leave it out", maps->limits[k]));
     const MapGrid grid = map_grid(scene, filling);
     if (const double cells = double(grid.columns) * double(grid.rows); cells > most_map_cells)
-        rules.error("maps.cell",
-                    text("expected at most {:.3g} cells over all walls and soil, found {:.3g} of {:.4g} m; let maps.cell be {:.2g} "
-                         "or more",
-                         most_map_cells, cells, maps->cell, 1.05 * maps->cell * std::sqrt(cells / most_map_cells)));
+        rules.error("maps.cell", text("expected at most {:.3g} cells over all walls and soil, found {:.3g} of {:.4g} m; "
+                                      "let maps.cell be {:.2g} or more",
+                                      most_map_cells, cells, maps->cell, 1.05 * maps->cell * std::sqrt(cells / most_map_cells)));
 }
 
 void check_time(const Scene& scene, StepLimit limit, Rules& rules)

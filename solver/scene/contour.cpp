@@ -24,7 +24,7 @@ public:
             if (at == next_.end()) continue; // on a ring before
             Ring& ring = all.emplace_back();
             while (at != next_.end()) {
-                ring.push_back(place(at->first));
+                ring.push_back(point_on(at->first));
                 const auto to = at->second;
                 next_.erase(at);
                 at = next_.find(to);
@@ -59,7 +59,7 @@ private:
         }
         return 2 * node(column + 1, row) + 1;
     }
-    std::array<double, 2> place(std::int64_t edge) const
+    std::array<double, 2> point_on(std::int64_t edge) const
     {
         const int column = int(edge / 2 % (grid_.columns + 2)) - 1, row = int(edge / 2 / (grid_.columns + 2)) - 1;
         const bool north = edge % 2;

@@ -2,8 +2,8 @@
 #include "solver/core/ensure.hpp"
 #include "solver/scene/box.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/lines_of_shape.hpp"
 #include "solver/scene/nearby.hpp"
-#include "solver/scene/rows_of_shape.hpp"
 #include <fmt/format.h>
 
 namespace kuzure::scene {
@@ -69,19 +69,19 @@ bool ever_together(const Piece& a, const Piece& b)
 /// Finds the problem of each piece, and the one with which all of them become too much: then true.
 bool too_much(const Scene& scene, std::vector<Piece>& pieces, Issues& issues)
 {
-    double rows = 0, edge_tests = 0;
+    double lines = 0, edge_tests = 0;
     for (auto& p : pieces) {
         p.problem = on_ground(*p.shape) ? Draped::problem(*p.shape, scene.space.spacing, scene.dimensions)
                                         : Lattice::problem(*p.shape, scene.space.spacing, scene.dimensions);
         if (!p.problem.empty()) continue;
-        if (!on_ground(*p.shape)) rows += Lattice::rows(*p.shape, scene.space.spacing, scene.dimensions);
+        if (!on_ground(*p.shape)) lines += Lattice::lines(*p.shape, scene.space.spacing, scene.dimensions);
         if (const auto* polygon = std::get_if<Polygon>(p.shape)) edge_tests += scene::edge_tests(*polygon, scene.space.spacing);
-        if (rows <= most_rows && edge_tests <= most_edge_tests) continue;
+        if (lines <= most_lines && edge_tests <= most_edge_tests) continue;
         issues.push_back({Severity::Error,
                           p.key,
                           fmt::format("expected shapes that a computer can hold together, found {:.3g} rows of particles up to this one at "
                                       "a spacing of {} m{}; is space.spacing in metres?",
-                                      rows, scene.space.spacing, edge_tests > most_edge_tests ? ", with too many corners" : ""),
+                                      lines, scene.space.spacing, edge_tests > most_edge_tests ? ", with too many corners" : ""),
                           {}});
         return true;
     }

@@ -77,7 +77,7 @@ HeightField::Nearest HeightField::nearest(Vector x) const
     constexpr double none = std::numeric_limits<double>::quiet_NaN();
     const Point above = at(x.x, x.y);
     const bool below = x.z < above.z;
-    // Foot of the perpendicular: from the tangent plane at a place to the next place, until they agree; half the way where it turns.
+    // Foot of the perpendicular: from the tangent plane at a point to the next point, until they agree; half the way where it turns.
     Vector at_surface{x.x, x.y, above.z}, normal{};
     Point p = above;
     double shortest = std::numeric_limits<double>::infinity();

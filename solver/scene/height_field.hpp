@@ -17,7 +17,7 @@ struct Grid {
     double at(int column, int row) const { return values[std::size_t(row) * std::size_t(columns) + std::size_t(column)]; }
     double x_of(int column) const { return x + column * cell; } // m
     double y_of(int row) const { return y + row * cell; }
-    /// Calls visit(column, row, place in `values`) for every point.
+    /// Calls visit(column, row, index in `values`) for every point.
     template <class Visit> void for_each(Visit visit) const
     {
         for (int j = 0; j < rows; ++j)
@@ -37,7 +37,7 @@ public:
     /// At least 3 x 3 heights.
     explicit HeightField(Grid heights);
     const Grid& grid() const { return grid_; }
-    /// Height (m) and slopes (1) above a place in plan; NaN where heights are missing around it or beyond the grid.
+    /// Height (m) and slopes (1) above a point in plan; NaN where heights are missing around it or beyond the grid.
     struct Point {
         double z, dz_dx, dz_dy;
     };

@@ -16,7 +16,7 @@ const double most_points = 1e11;
 
 } // namespace
 
-/// Cuts indices along x into runs that lie all inside or all outside: single points within the zones and at
+/// Splits indices along x into runs that lie all inside or all outside: single points within the zones and at
 /// their rims, whole stretches between them. Calls visit(first, last), inclusive.
 template <class Zones, class Visit> void Lattice::for_each_run(Range r, const Zones& zones, Visit visit) const
 {
@@ -58,7 +58,7 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
             "expected coordinates that tell particles {:g} m apart from each other, found such that rounding moves by {:.2g} m; "
             "move the scene nearer to the origin",
             spacing, rounding);
-    if (points > most_points || rows(shape, spacing, dimensions) > most_rows)
+    if (points > most_points || lines(shape, spacing, dimensions) > most_lines)
         return fmt::format("expected a shape that a computer can hold, found {:.3g} particles at a spacing of {} m; "
                            "is space.spacing in metres?",
                            points, spacing);
@@ -69,7 +69,7 @@ std::string Lattice::problem(const Shape& shape, double spacing, int dimensions)
     return {};
 }
 
-double Lattice::rows(const Shape& shape, double spacing, int dimensions)
+double Lattice::lines(const Shape& shape, double spacing, int dimensions)
 {
     if (std::holds_alternative<Box>(shape)) return 0;
     const Box outer = scene::bounds(shape);
@@ -82,7 +82,7 @@ Lattice::Lattice(const Shape& shape, double spacing, int dimensions, Vector leas
     near_ = std::max(tolerance * spacing, 4 * on_face_);
     ensure(problem(shape, spacing, dimensions).empty(), "a shape is filled that cannot be");
     if (const auto* box = std::get_if<Box>(&shape)) lay_box(*box);
-    else lay_rows(shape);
+    else lay_lines(shape);
     x_.least = least.x, y_.least = least.y, z_.least = least.z;
     size_ = stride_z_ ? layer_id_.back() : count(z_.range) > 0 ? count(z_.range) * layer_id_[1] : 0;
     if (size_ > 0) bounds_ = box_around_points();
@@ -94,7 +94,7 @@ void Lattice::lay_box(const Box& box)
     x_ = side(box.low.x, box.high.x), z_ = side(box.low.z, box.high.z);
     if (dimensions_ == 3) y_ = side(box.low.y, box.high.y);
     is_box_ = true;
-    row_start_ = {0, 1};
+    line_start_ = {0, 1};
     intervals_ = {{0, x_.range.last, 0}};
     layer_id_ = {0, count(y_.range) * count(x_.range)};
 }
@@ -104,9 +104,9 @@ bool Lattice::inside(const Shape& shape, std::int64_t kx, std::int64_t ky, std::
     return holds(shape, {coordinate(x_, kx), y_of(ky), coordinate(z_, kz)}, dimensions_, on_face_);
 }
 
-/// The row through a round shape is one interval. Its ends are estimated, then put right by what lies inside; the distance itself is taken
+/// The line through a round shape is one interval. Its ends are estimated, then put right by what lies inside; the distance itself is taken
 /// only where the squares do not tell.
-Lattice::Range Lattice::round_row(const Shape& shape, const Passage& p, std::int64_t ky, std::int64_t kz) const
+Lattice::Range Lattice::round_line(const Shape& shape, const Passage& p, std::int64_t ky, std::int64_t kz) const
 {
     const double inner = p.radius - near_, outer = p.radius + near_;
     if (p.across2 > outer * outer) return Range{0, -1};
@@ -143,27 +143,27 @@ void Lattice::find_repetition(const Shape& shape)
     }
 }
 
-std::int64_t Lattice::add_row(const Shape& shape, std::int64_t ky, std::int64_t kz)
+std::int64_t Lattice::add_line(const Shape& shape, std::int64_t ky, std::int64_t kz)
 {
-    std::int64_t in_row = 0;
+    std::int64_t in_line = 0;
     const auto add = [&](std::int64_t first, std::int64_t last) {
-        if (in_row > 0 && intervals_.back().last == first - 1) intervals_.back().last = last;
-        else intervals_.push_back({first, last, in_row});
-        in_row += last - first + 1;
+        if (in_line > 0 && intervals_.back().last == first - 1) intervals_.back().last = last;
+        else intervals_.push_back({first, last, in_line});
+        in_line += last - first + 1;
     };
     if (const auto p = passage(shape, y_of(ky), coordinate(z_, kz), dimensions_)) {
-        if (const Range r = round_row(shape, *p, ky, kz); r.first <= r.last) add(r.first, r.last);
+        if (const Range r = round_line(shape, *p, ky, kz); r.first <= r.last) add(r.first, r.last);
     } else {
         const auto zones = zones_near_surface(shape, y_of(ky), coordinate(z_, kz), near_, dimensions_);
         for_each_run(x_.range, zones, [&](std::int64_t first, std::int64_t last) {
             if (inside(shape, first, ky, kz)) add(first, last);
         });
     }
-    row_start_.push_back(intervals_.size());
-    return in_row;
+    line_start_.push_back(intervals_.size());
+    return in_line;
 }
 
-void Lattice::lay_rows(const Shape& shape)
+void Lattice::lay_lines(const Shape& shape)
 {
     const Box outer = scene::bounds(shape);
     const auto side = [&](double low, double high) {
@@ -176,17 +176,17 @@ void Lattice::lay_rows(const Shape& shape)
 
     const std::int64_t stored_z = stride_z_ ? count(z_.range) : std::min<std::int64_t>(count(z_.range), 1);
     const std::int64_t stored_y = stride_y_ ? count(y_.range) : 1;
-    row_start_.reserve(std::size_t(stored_z * stored_y) + 1);
+    line_start_.reserve(std::size_t(stored_z * stored_y) + 1);
     intervals_.reserve(std::size_t(stored_z * stored_y));
-    if (stride_y_) row_id_.reserve(std::size_t(stored_z * stored_y));
-    row_start_ = {0};
+    if (stride_y_) line_id_.reserve(std::size_t(stored_z * stored_y));
+    line_start_ = {0};
     layer_id_ = {0};
     for (std::int64_t iz = 0; iz < stored_z; ++iz) {
         std::int64_t in_layer = 0;
         for (std::int64_t iy = 0; iy < stored_y; ++iy) {
-            if (stride_y_) row_id_.push_back(in_layer);
-            const std::int64_t in_row = add_row(shape, y_.range.first + iy, z_.range.first + iz);
-            in_layer += stride_y_ ? in_row : in_row * count(y_.range);
+            if (stride_y_) line_id_.push_back(in_layer);
+            const std::int64_t in_line = add_line(shape, y_.range.first + iy, z_.range.first + iz);
+            in_layer += stride_y_ ? in_line : in_line * count(y_.range);
         }
         layer_id_.push_back(layer_id_.back() + in_layer);
     }
@@ -200,7 +200,7 @@ Box Lattice::box_around_points() const
     for (std::int64_t iz = 0; iz < stored_z; ++iz)
         for (std::int64_t iy = 0; iy < stored_y; ++iy) {
             const std::int64_t kz = z_.range.first + iz, ky = y_.range.first + iy;
-            const auto in = row(kz, ky).intervals;
+            const auto in = line(kz, ky).intervals;
             if (in.empty()) continue;
             const std::int64_t top = stride_z_ ? kz : z_.range.last, back = stride_y_ ? ky : y_.range.last;
             around = united(around, {{coordinate(x_, in.front().first), y_of(ky), coordinate(z_, kz)},
@@ -235,16 +235,16 @@ Vector Lattice::position(std::int64_t local) const
     }
     const std::int64_t kz = z_.range.first + iz;
     if (stride_y_) {
-        const auto begin = row_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0), end = begin + count(y_.range);
+        const auto begin = line_id_.begin() + (stride_z_ ? iz * count(y_.range) : 0), end = begin + count(y_.range);
         iy = std::upper_bound(begin, end, index) - begin - 1;
         index -= begin[iy];
     } else {
-        const std::int64_t n = row(kz, y_.range.first).size;
+        const std::int64_t n = line(kz, y_.range.first).size;
         iy = index / n;
         index %= n;
     }
     const std::int64_t ky = y_.range.first + iy;
-    const auto in = row(kz, ky).intervals;
+    const auto in = line(kz, ky).intervals;
     auto here = in.begin();
     while (index > here->before + here->last - here->first) ++here;
     return {coordinate(x_, here->first + index - here->before), y_of(ky), coordinate(z_, kz)};
@@ -258,7 +258,7 @@ std::int64_t Lattice::count_in(const Box& region) const
     std::int64_t sum = 0;
     for (std::int64_t kz = zs.first; kz <= (stride_z_ ? zs.last : zs.first); ++kz)
         for (std::int64_t ky = ys.first; ky <= (stride_y_ ? ys.last : ys.first); ++ky)
-            for (const Interval& in : row(kz, ky).intervals)
+            for (const Interval& in : line(kz, ky).intervals)
                 sum += std::max<std::int64_t>(0, std::min(in.last, xs.last) - std::max(in.first, xs.first) + 1);
     return sum * (stride_z_ ? 1 : count(zs)) * (stride_y_ ? 1 : count(ys));
 }
@@ -284,7 +284,7 @@ bool Lattice::reaches_into(const Shape& other) const
     for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
         for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
             const double y = y_of(ky), z = coordinate(z_, kz);
-            const auto in = row(kz, ky).intervals;
+            const auto in = line(kz, ky).intervals;
             if (in.empty() || depth_between_faces(other, y, z, dimensions_) <= depth) continue;
             const auto zones = zones_near_surface(other, y, z, 2 * depth, dimensions_);
             bool found = false;

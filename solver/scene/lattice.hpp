@@ -2,7 +2,7 @@
 // The lattice points of one shape, computed and never stored. Every rank and every region gets the same bits, because one function
 // computes every coordinate.
 #include "solver/scene/draped.hpp"
-#include "solver/scene/rows_of_shape.hpp"
+#include "solver/scene/lines_of_shape.hpp"
 #include "solver/scene/shape.hpp"
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace kuzure::scene {
 
-/// Coordinate (m) of lattice point k along one axis: the only place where it is computed.
+/// Coordinate (m) of lattice point k along one axis: computed here and nowhere else.
 inline double lattice_coordinate(double origin, std::int64_t k, double spacing) { return origin + (double(k) + 0.5) * spacing; }
 
 /// Points of a regular grid: lattice points first .. first + n - 1 along each axis.
@@ -28,13 +28,13 @@ struct GridPart {
     double at(int axis, std::int64_t k) const { return lattice_coordinate(origin[axis], first[axis] + k, spacing); }
 };
 
-/// More rows to be stored than this, of all shapes together, mean a spacing that is not meant: each takes 40 bytes, and 0.1 microseconds
+/// More lines to be stored than this, of all shapes together, mean a spacing that is not meant: each takes 40 bytes, and 0.1 microseconds
 /// to be found.
-inline constexpr double most_rows = 2e7;
+inline constexpr double most_lines = 2e7;
 
 /// The lattice points that belong to one shape: n a side of a box from its lower corner; of other shapes those of the one lattice at
-/// (k + 1/2) spacings that holds() gives them, so that a cut or a shift by whole spacings neither loses nor moves a point. Order of
-/// local ids: z slowest, then y, then x. Boxes keep three numbers; other shapes keep, for every row along x, the intervals inside.
+/// (k + 1/2) spacings that holds() gives them, so that a division or a shift by whole spacings neither loses nor moves a point. Order of
+/// local ids: z slowest, then y, then x. Boxes keep three numbers; other shapes keep, for every line along x, the intervals inside.
 class Lattice {
 public:
     /// Throws Broken if the shape cannot be filled: ask problem() first. No coordinate (m) is below `least`, where a shape ends: a point
@@ -44,8 +44,8 @@ public:
                                     -std::numeric_limits<double>::infinity()};
     /// Why the shape cannot be filled with whole lattice points, or empty.
     static std::string problem(const Shape&, double spacing, int dimensions);
-    /// At most so many rows along x are kept for a shape.
-    static double rows(const Shape&, double spacing, int dimensions);
+    /// At most so many lines along x are kept for a shape.
+    static double lines(const Shape&, double spacing, int dimensions);
 
     std::int64_t size() const { return size_; }
     Vector position(std::int64_t local) const;
@@ -65,9 +65,9 @@ public:
 private:
     struct Interval {
         std::int64_t first, last; // indices along x, inclusive
-        std::int64_t before;      // points of the same row in front of it
+        std::int64_t before;      // points of the same line in front of it
     };
-    struct Row {
+    struct Line {
         std::span<const Interval> intervals;
         std::int64_t size;
     };
@@ -85,33 +85,33 @@ private:
     Range within(const Axis&, double low, double high) const;
     template <class Zones, class Visit> void for_each_run(Range, const Zones&, Visit) const;
     void lay_box(const Box&);
-    void lay_rows(const Shape&);
-    /// Cuts off the layers that lie outside along the axis of extrusion and tells along which axes rows repeat.
+    void lay_lines(const Shape&);
+    /// Drops the layers that lie outside along the axis of extrusion and tells along which axes lines repeat.
     void find_repetition(const Shape&);
-    /// Appends the intervals of a row; points in it.
-    std::int64_t add_row(const Shape&, std::int64_t ky, std::int64_t kz);
-    Range round_row(const Shape&, const Passage&, std::int64_t ky, std::int64_t kz) const;
+    /// Appends the intervals of a line; points in it.
+    std::int64_t add_line(const Shape&, std::int64_t ky, std::int64_t kz);
+    Range round_line(const Shape&, const Passage&, std::int64_t ky, std::int64_t kz) const;
     bool inside(const Shape&, std::int64_t kx, std::int64_t ky, std::int64_t kz) const;
     Box box_around_points() const;
-    /// Rows repeat along an axis on which the shape does not change: the stride there is 0.
-    std::size_t row_index(std::int64_t kz, std::int64_t ky) const
+    /// Lines repeat along an axis on which the shape does not change: the stride there is 0.
+    std::size_t line_index(std::int64_t kz, std::int64_t ky) const
     {
         return std::size_t((kz - z_.range.first) * stride_z_ + (ky - y_.range.first) * stride_y_);
     }
-    Row row(std::int64_t kz, std::int64_t ky) const
+    Line line(std::int64_t kz, std::int64_t ky) const
     {
-        const std::size_t r = row_index(kz, ky), a = row_start_[r], b = row_start_[r + 1];
+        const std::size_t r = line_index(kz, ky), a = line_start_[r], b = line_start_[r + 1];
         const std::span<const Interval> in(intervals_.data() + a, b - a);
         return {in, in.empty() ? 0 : in.back().before + in.back().last - in.back().first + 1};
     }
-    /// Local id of the first point of a row.
-    std::int64_t row_id(std::int64_t kz, std::int64_t ky) const
+    /// Local id of the first point of a line.
+    std::int64_t line_id(std::int64_t kz, std::int64_t ky) const
     {
         const std::int64_t iz = kz - z_.range.first, iy = ky - y_.range.first;
         const std::int64_t layers = stride_z_ ? layer_id_[std::size_t(iz)] : iz * layer_id_[1];
-        if (stride_y_ == 0) return layers + iy * row(kz, ky).size;
+        if (stride_y_ == 0) return layers + iy * line(kz, ky).size;
         const std::size_t layer = stride_z_ ? std::size_t(iz) : 0, n_y = std::size_t(count(y_.range));
-        return layers + row_id_[layer * n_y + std::size_t(iy)];
+        return layers + line_id_[layer * n_y + std::size_t(iy)];
     }
     static std::int64_t count(const Range& r) { return r.last - r.first + 1; }
 
@@ -121,10 +121,10 @@ private:
     double on_face_, near_; // m: nearer than this a point lies on a face, nearer than that it is looked at by itself
     Axis x_, y_, z_;
     std::int64_t stride_z_ = 0, stride_y_ = 0;
-    std::vector<std::size_t> row_start_; // first interval of every stored row, and the end
+    std::vector<std::size_t> line_start_; // first interval of every stored line, and the end
     std::vector<Interval> intervals_;
     std::vector<std::int64_t> layer_id_; // id of the first point of every stored layer, and the end
-    std::vector<std::int64_t> row_id_;   // id of a row's first point within its layer, where rows change along y
+    std::vector<std::int64_t> line_id_;  // id of a line's first point within its layer, where lines change along y
     std::int64_t size_ = 0;
     Box bounds_{};
 };
@@ -136,8 +136,8 @@ template <class Visit> void Lattice::for_each_in(const Box& region, Visit visit)
     for (std::int64_t kz = zs.first; kz <= zs.last; ++kz)
         for (std::int64_t ky = ys.first; ky <= ys.last; ++ky) {
             const double y = y_of(ky), z = coordinate(z_, kz);
-            const std::int64_t first = row_id(kz, ky);
-            for (const Interval& in : row(kz, ky).intervals) {
+            const std::int64_t first = line_id(kz, ky);
+            for (const Interval& in : line(kz, ky).intervals) {
                 const std::int64_t a = std::max(in.first, xs.first), b = std::min(in.last, xs.last);
                 for (std::int64_t k = a; k <= b; ++k) visit(first + in.before + (k - in.first), Vector{coordinate(x_, k), y, z});
             }
@@ -151,7 +151,7 @@ template <class Visit> void Lattice::for_each_stack_in(const Box& region, Visit 
     const Range ys = dimensions_ == 2 ? y_.range : within(y_, region.low.y, region.high.y);
     if (count(zs) <= 0) return;
     const auto has = [&](std::int64_t kx, std::int64_t ky, std::int64_t kz) {
-        const auto in = row(kz, ky).intervals;
+        const auto in = line(kz, ky).intervals;
         return std::any_of(in.begin(), in.end(), [&](const Interval& i) { return i.first <= kx && kx <= i.last; });
     };
     const auto found = [&](std::int64_t kx, std::int64_t ky, std::int64_t first, std::int64_t last) {

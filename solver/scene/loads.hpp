@@ -6,7 +6,7 @@
 
 namespace kuzure::scene {
 
-/// True where the soil of a body at a place (m) is what a load pushes.
+/// True where the soil of a body at a point (m) is what a load pushes.
 bool pushes(const Scene&, const Load&, int body, Vector x);
 /// True where some load pushes soil as the run starts.
 bool loaded_at_start(const Scene&);

@@ -12,7 +12,7 @@ struct MapGrid {
 
     std::int64_t count() const { return columns * rows; }
     double area() const { return cell * cell; } // m^2
-    /// The cell that holds a place (its western and southern edges belong to it), or -1 beyond all.
+    /// The cell that holds a point (its western and southern edges belong to it), or -1 beyond all.
     std::int64_t at(double px, double py) const
     {
         const double column = std::floor((px - x) / cell), row = std::floor((py - y) / cell);

@@ -21,12 +21,12 @@ Pose turn_about(Vector axis, double angle)
 Vector along(const Record& path, double seconds)
 {
     const auto& rows = *path.rows;
-    const auto place = [](const std::array<double, 4>& row) { return Vector{row[1], row[2], row[3]}; };
+    const auto at = [](const std::array<double, 4>& row) { return Vector{row[1], row[2], row[3]}; };
     const auto after = std::upper_bound(rows.begin(), rows.end(), seconds, [](double t, const auto& row) { return t < row[0]; });
-    if (after == rows.begin()) return place(rows.front());
-    if (after == rows.end()) return place(rows.back());
+    if (after == rows.begin()) return at(rows.front());
+    if (after == rows.end()) return at(rows.back());
     const auto &a = *(after - 1), &b = *after;
-    return place(a) + ((seconds - a[0]) / (b[0] - a[0])) * (place(b) - place(a));
+    return at(a) + ((seconds - a[0]) / (b[0] - a[0])) * (at(b) - at(a));
 }
 /// Seconds at full speed that go as far as a move of `whole` seconds has gone after so many, whose speed grows and ends in `ramp`.
 double at_full_speed(double seconds, double whole, double ramp)

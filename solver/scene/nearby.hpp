@@ -1,5 +1,5 @@
 #pragma once
-// Which of many shapes may lie at a place: their boxes in a grid, so that thousands of bodies are not all asked everywhere.
+// Which of many shapes may lie at a point: their boxes in a grid, so that thousands of bodies are not all asked everywhere.
 #include "solver/scene/box.hpp"
 #include "solver/scene/shape.hpp"
 #include <array>
@@ -12,7 +12,7 @@ namespace kuzure::scene {
 
 class Nearby {
 public:
-    /// Shapes are called by their places in `boxes`; in 2-D y does not count.
+    /// Shapes are called by their indices in `boxes`; in 2-D y does not count.
     Nearby(std::vector<Box> boxes, int dimensions) : boxes_(std::move(boxes)), dimensions_(dimensions)
     {
         const double per_axis = boxes_.empty() ? 1 : std::ceil(std::pow(double(boxes_.size()), 1.0 / dimensions));
@@ -61,7 +61,7 @@ private:
     static constexpr double infinite = std::numeric_limits<double>::infinity();
     using Cell = std::array<std::int64_t, 3>;
     std::size_t index(std::int64_t x, std::int64_t y, std::int64_t z) const { return std::size_t((z * n_[1] + y) * n_[0] + x); }
-    /// The cell of a place, the outermost ones for what lies outside; it never falls where a coordinate rises.
+    /// The cell of a point, the outermost ones for what lies outside; it never falls where a coordinate rises.
     Cell cell(const Vector& x) const
     {
         Cell c{};

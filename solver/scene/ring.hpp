@@ -4,7 +4,7 @@
 
 namespace kuzure::scene {
 
-/// True if a place lies inside a ring, by the even-odd rule; half open, so that a corner counts once.
+/// True if a point lies inside a ring, by the even-odd rule; half open, so that a corner counts once.
 inline bool encloses(const Ring& ring, double x, double y)
 {
     bool inside = false;
@@ -14,7 +14,7 @@ inline bool encloses(const Ring& ring, double x, double y)
     }
     return inside;
 }
-/// True if an odd number of rings encloses a place: inside of outer rings, outside of their holes.
+/// True if an odd number of rings encloses a point: inside of outer rings, outside of their holes.
 inline bool encloses(const std::vector<Ring>& rings, double x, double y)
 {
     bool inside = false;

@@ -19,7 +19,7 @@ struct Accuracy {
     bool operator==(const Accuracy&) const = default;
 };
 
-enum class View { Oblique, Side, Top, Cut }; // Cut: a slice along x through the soil's middle, seen from the side
+enum class View { Oblique, Side, Top, Slice }; // Slice: along x through the soil's middle, seen from the side
 enum class Color { Displacement, Speed, PlasticStrain, Pressure };
 struct Picture {
     View view = View::Oblique;
@@ -61,8 +61,7 @@ struct Start {
 
 // ---- real ground ----
 enum class Edge { Open, Closed }; // what soil does that leaves the ground: it is counted, or it ends the run
-/// Elevation models, and how soil meets the ground. The ground itself is a wall with the shape Ground, made from these when a scene is
-/// read.
+/// Elevation models, and how soil meets the ground. The ground itself is a wall with the shape Ground, made from these at reading.
 struct Terrain {
     std::vector<std::string> dem;                // absolute paths; a later one fills what earlier ones leave open
     std::string crs;                             // "EPSG:6670"; empty: that of the files
@@ -137,7 +136,7 @@ struct Event {
     std::optional<LoadChange> load;
     bool operator==(const Event&) const = default;
 };
-/// A row a time in probes.csv: of a place, of one particle or of the mean of a body.
+/// A row a time in probes.csv: of a point, of one particle or of the mean of a body.
 struct Probe {
     std::string name;            // empty: its number
     std::optional<Vector> point; // m

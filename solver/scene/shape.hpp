@@ -85,7 +85,7 @@ double rounding_of(const Shape&, int dimensions);
 double volume(const Shape&, int dimensions);
 /// The smallest box around a shape; in 2-D its y is that of the file and means nothing.
 Box bounds(const Shape&);
-/// Thickness of a release above a place in plan, m along z; 0 outside its outline and where its bed or thicknesses are unknown.
+/// Thickness of a release above a point in plan, m along z; 0 outside its outline and where its bed or thicknesses are unknown.
 double thickness(const Release&, double x, double y);
 /// Volume (m^3) and area in plan (m^2) of a release, and its greatest thickness (m).
 struct Extent {

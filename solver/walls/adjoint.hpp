@@ -8,7 +8,7 @@
 //
 // the force's power v . f equals -sigma : L, so that a fixed wall neither gives nor takes energy. Rough: P = 1; smooth and Coulomb:
 // P = n (x) n. Coulomb's friction is a traction of its own (friction.hpp).
-// Where a wall moves, v_i - v_w takes the place of v_i, v_w the velocity of the surface: the force's power is then -sigma : L and that of
+// Where a wall moves, v_i - v_w stands for v_i, v_w the velocity of the surface: the force's power is then -sigma : L and that of
 // the wall, f . v_w, which is booked apart (moved_wall).
 #include "solver/core/memory.hpp"
 #include "solver/pairs/cluster.hpp"
@@ -55,8 +55,8 @@ struct MirrorImage {
     template <class V> KUZURE_INLINE V factor(V, V) const { return V(number<V>(2)); }
 };
 
-/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest. `motion`: of the faces, where walls
-/// move.
+/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
+/// `motion`: of the faces, where walls move.
 template <bool moving, class Law, class V, class T>
 KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceMotion<T>* motion)
 {

@@ -28,8 +28,8 @@ template <class V> KUZURE_INLINE Lag<V> lag(double dt, V c_p, double h)
     return {keep, passing * keep};
 }
 
-/// `moved`: displacement of the step (m); `normal`: of the surface; `limit`: the largest friction (m/s^2); `stiffness`: of the spring,
-/// 1/s^2.
+/// `moved`: displacement of the step (m); `normal`: of the surface; `limit`: the largest friction (m/s^2);
+/// `stiffness`: of the spring (1/s^2).
 inline Friction return_to_coulomb(Vector slip, Vector moved, Vector normal, double limit, double stiffness)
 {
     if (!(limit > 0) || !(stiffness > 0)) return {};

@@ -63,7 +63,7 @@ template <class Visit> void for_each_face(const scene::Ground& g, Vector x, int,
 {
     const auto n = g.field->nearest(x);
     if (!std::isfinite(n.distance)) return;
-    // The way itself is the normal: so also at the focus of a hollow, where many places are as near.
+    // The way itself is the normal: so also at the focus of a hollow, where many points are as near.
     const Vector way = x - n.point;
     const bool far = std::fabs(n.distance) > 1e-6 * g.field->grid().cell;
     visit(Candidate{n.point, far ? (1 / n.distance) * way : n.normal});
@@ -168,7 +168,7 @@ void WallSurface::faces(Vector point, double reach, std::vector<Face>& found) co
             },
             scene_.walls[part.wall].shape);
     }
-    // Of equally near ones that which looks up, then along x, then y: how the ground is drawn does not show.
+    // Of equally near ones that which faces up, then along x, then y: how the ground is drawn does not show.
     const auto rank = [&](const Face& f) { return f.depth - tolerance_ * dot(f.normal, {0.1, 0.01, 1}); };
     std::sort(found.begin(), found.end(), [&](const Face& a, const Face& b) { return rank(a) < rank(b); });
 }

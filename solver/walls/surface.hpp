@@ -1,6 +1,6 @@
 #pragma once
 // The walls of a scene as one surface: the boundary of the union of all their shapes and of their images across the periods. A
-// face that another wall covers or continues is no surface. How the same ground is cut or joined does not show.
+// face that another wall covers or continues is no surface. How the same ground is divided or joined does not show.
 #include "solver/scene/scene.hpp"
 #include <vector>
 
@@ -15,9 +15,9 @@ struct Face {
     /// Where it touches the surface, seen from the point x, m.
     Vector foot(Vector x) const { return x + depth * normal; }
 };
-/// What of a force on a face the wall of the face feels; the rest is felt by the wall of the point behind it, if that is another.
+/// What of a force on a face the wall of the face feels; the remainder is felt by the wall of the point behind it, if that is another.
 inline Vector own_share(const Face& f, Vector force) { return dot(f.side, f.normal) > 1 - 1e-9 ? force : dot(force, f.side) * f.side; }
-/// Velocity of a face from those of walls, velocity(wall, place); x: the point behind it, of the wall `own`. At an edge between two walls
+/// Velocity of a face from those of walls, velocity(wall, point); x: the point behind it, of the wall `own`. At an edge between two walls
 /// each counts the way in which it feels the force.
 template <class Velocity> Vector velocity_of(const Face& f, int own, Vector x, Velocity velocity)
 {

@@ -1,4 +1,4 @@
-// Any bytes are a checkpoint or a refusal in words. The first byte of the input chooses what the rest is:
+// Any bytes are a checkpoint or a refusal in words. The first byte of the input chooses what the others are:
 //   0  a whole file;
 //   1  changes of a good checkpoint: triples (offset, offset, value), with which most of the file's structures stand;
 //   2  the manifest of a file whose checksums are right, up to a zero byte, then the header: what lies behind them.
@@ -203,24 +203,24 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
         return io::read_text(file);
     }();
     if (size == 0 || size > (1 << 20)) return 0;
-    const std::string_view rest(reinterpret_cast<const char*>(data) + 1, size - 1);
+    const std::string_view body(reinterpret_cast<const char*>(data) + 1, size - 1);
     const auto file = scratch.path / "input.h5";
     switch (data[0] % 3) {
     case 0:
-        write(file, rest);
+        write(file, body);
         break;
     case 1: {
         std::string changed = good;
-        for (std::size_t k = 0; k + 2 < rest.size(); k += 3) {
-            const auto byte = [&](std::size_t i) { return std::size_t(static_cast<unsigned char>(rest[k + i])); };
-            changed[(byte(0) * 256 + byte(1)) % changed.size()] = rest[k + 2];
+        for (std::size_t k = 0; k + 2 < body.size(); k += 3) {
+            const auto byte = [&](std::size_t i) { return std::size_t(static_cast<unsigned char>(body[k + i])); };
+            changed[(byte(0) * 256 + byte(1)) % changed.size()] = body[k + 2];
         }
         write(file, changed);
         break;
     }
     default: {
-        const auto end = rest.find('\0');
-        write(file, filled_with(scratch.path, std::string(rest.substr(0, end)), end == rest.npos ? "" : std::string(rest.substr(end + 1))));
+        const auto end = body.find('\0');
+        write(file, filled_with(scratch.path, std::string(body.substr(0, end)), end == body.npos ? "" : std::string(body.substr(end + 1))));
     }
     }
     refusal(file);

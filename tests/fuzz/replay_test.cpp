@@ -32,7 +32,7 @@ TEST(Replay, TheCorpusHarmsNothing)
     for (const auto& input : inputs) EXPECT_EQ(LLVMFuzzerTestOneInput(input.data(), input.size()), 0);
 }
 
-// A little of the fuzzer's own work, the same every time: bytes changed, cut, and joined with others'.
+// A little of the fuzzer's own work, the same every time: bytes changed, dropped, and joined with others'.
 TEST(Replay, NorDoItsNeighbours)
 {
     const auto inputs = corpus();

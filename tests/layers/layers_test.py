@@ -59,6 +59,10 @@ GENERATED = {"build", "results"}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
+# Headers that no intrinsics come through: every file that includes them would pay half a second of the compiler's time.
+PLAIN = ("solver/core", "solver/scene", "decomposition", "io")
+
+
 # A file of more lines than this says at its top why, in words that begin so.
 LONG, REASON = 420, "beyond 400 lines:"
 # A function of more lines than this, its body's braces included, is several; those that are not, and why.
@@ -97,8 +101,8 @@ def foreign_through(path, includes, pattern, seen):
     for _, _, what in includes.get(path, []):
         if re.fullmatch(pattern, what):
             return [path, f"<{what}>"]
-        if what in includes and what not in seen and (rest := foreign_through(what, includes, pattern, seen)):
-            return [path, *rest]
+        if what in includes and what not in seen and (onward := foreign_through(what, includes, pattern, seen)):
+            return [path, *onward]
     return None
 
 
@@ -109,6 +113,11 @@ def violations(root, top_level):
     for name in sorted(top_level):
         if name not in FOLDERS | GENERATED and not name.startswith("."):
             yield f"{name}/: not one of the top-level folders {', '.join(sorted(FOLDERS))}"
+    for path in includes:
+        if path.endswith(".hpp") and any(inside(path, place) for place in PLAIN):
+            chain = foreign_through(path, includes, r"immintrin\.h", set())
+            if chain and len(chain) > 2:
+                yield f"{path}:1: comes to intrinsics through {' -> '.join(chain[1:-1])}: solver/core/scalar.hpp does without"
     for path, lines in includes.items():
         layer = layer_of(path)
         if layer is None:
@@ -186,7 +195,7 @@ PLANTED = {  # file, its text, what must be said of it ("" for nothing)
     "solver/core/simd.hpp": ("#include <immintrin.h>\n", ""),
     "solver/core/team.hpp": ("#include <span>\n", ""),
     "solver/core/up.hpp": ('#include "solver/scene/scene.hpp"\n', "solver/core may not include solver/scene/scene.hpp"),
-    "solver/scene/scene.hpp": ('#include "solver/core/simd.hpp"\n', ""),
+    "solver/scene/scene.hpp": ('#include "solver/core/simd.hpp"\n', "comes to intrinsics through solver/core/simd.hpp"),
     "solver/physics/wide.hpp": ("#  include <x86intrin.h> // why\n", "includes x86intrin.h"),
     "solver/physics/loop.hpp": ('#include "solver/kernels/scheme.hpp"\n', "solver/physics may not include"),
     "solver/neighbours/sums.hpp": ('#include "solver/pairs/sums.hpp"\n', "solver/neighbours may not include"),

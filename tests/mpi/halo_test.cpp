@@ -129,7 +129,7 @@ void drift(const Cloud& c, Particles& p, double d, unsigned seed)
     }
 }
 
-struct Row {
+struct Record {
     std::int64_t id, step;
     Vector x;
 };
@@ -137,18 +137,18 @@ struct Row {
 void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles& p)
 {
     const HaloPlan plan = domain.plan_halo(p, c.reach);
-    Halo halo(world(), plan, sizeof(Row));
+    Halo halo(world(), plan, sizeof(Record));
     const auto all = all_particles(p);
     std::vector<char> own(all.size(), 0);
     for (Index i = 0; i < p.size(); ++i) own[p[field::id][i]] = 1;
 
     const auto x = p[field::position];
-    const auto rows = halo.collect<Row>([&](Index i, Vector s) { return Row{p[field::id][i], 0, x[i] + s}; });
-    ASSERT_EQ(Index(rows.size()), halo.n_ghosts());
+    const auto records = halo.collect<Record>([&](Index i, Vector s) { return Record{p[field::id][i], 0, x[i] + s}; });
+    ASSERT_EQ(Index(records.size()), halo.n_ghosts());
 
     // No ghost twice, each one where its owner with one of the shifts is, none of them my own unshifted.
     std::set<std::pair<std::int64_t, int>> present;
-    for (const Row& g : rows) {
+    for (const Record& g : records) {
         int shift = -1;
         for (int s = 0; s < 27; ++s) {
             const Vector d = plan.shift[s];
@@ -177,41 +177,41 @@ void expect_complete_halo(const Cloud& c, const Domain& domain, const Particles&
         }
     EXPECT_EQ(missing, 0);
     // A tight plan: boxes around the soil send little that nobody needs.
-    EXPECT_LE(world().sum(std::int64_t(rows.size())), 3 * world().sum(wanted) + 100);
+    EXPECT_LE(world().sum(std::int64_t(records.size())), 3 * world().sum(wanted) + 100);
 
     // What the solver sorts by.
     const auto ghosts = halo.ghosts(p);
-    ASSERT_EQ(ghosts.size(), rows.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-        EXPECT_EQ(ghosts[k].id, rows[k].id);
-        EXPECT_EQ(ghosts[k].soil, rows[k].id % 3);
+    ASSERT_EQ(ghosts.size(), records.size());
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        EXPECT_EQ(ghosts[k].id, records[k].id);
+        EXPECT_EQ(ghosts[k].soil, records[k].id % 3);
     }
 
     // Refreshes deliver what the owner has now, to the slot it was given.
-    std::vector<Index> slot(rows.size());
+    std::vector<Index> slot(records.size());
     for (std::size_t k = 0; k < slot.size(); ++k) slot[k] = Index(slot.size() - 1 - k);
     for (std::int64_t step = 1; step <= 6; ++step) {
-        if (step == 3) halo.place(slot);
+        if (step == 3) halo.assign_slots(slot);
         halo.begin([&](Index i, Vector s, std::byte* to) {
-            const Row r{p[field::id][i], step, x[i] + s};
+            const Record r{p[field::id][i], step, x[i] + s};
             std::memcpy(to, &r, sizeof r);
         });
         if (step % 2)
             for (int k = 0; k < 3; ++k) halo.progress();
-        std::vector<Row> arrived(rows.size(), Row{-1, -1, {}});
-        halo.arrive([&](Index at, const std::byte* from) { std::memcpy(&arrived[at], from, sizeof(Row)); });
-        for (std::size_t k = 0; k < rows.size(); ++k) {
-            const Row& r = arrived[step < 3 ? k : std::size_t(slot[k])];
-            ASSERT_EQ(r.id, rows[k].id);
+        std::vector<Record> arrived(records.size(), Record{-1, -1, {}});
+        halo.arrive([&](Index at, const std::byte* from) { std::memcpy(&arrived[at], from, sizeof(Record)); });
+        for (std::size_t k = 0; k < records.size(); ++k) {
+            const Record& r = arrived[step < 3 ? k : std::size_t(slot[k])];
+            ASSERT_EQ(r.id, records[k].id);
             ASSERT_EQ(r.step, step);
-            ASSERT_EQ(r.x, rows[k].x);
+            ASSERT_EQ(r.x, records[k].x);
         }
     }
     EXPECT_EQ(halo.refreshes(), 6);
     std::int64_t sent = 0;
     int messages = 0;
     for (const auto& peer : plan.peers)
-        if (peer.rank != world().rank()) sent += std::int64_t(peer.sends.size() * sizeof(Row)), ++messages;
+        if (peer.rank != world().rank()) sent += std::int64_t(peer.sends.size() * sizeof(Record)), ++messages;
     EXPECT_EQ(halo.bytes_per_refresh(), sent);
     EXPECT_EQ(halo.messages_per_refresh(), messages);
 }
@@ -294,7 +294,7 @@ TEST(Halo, RefusesMisuse)
     halo.begin(copy);
     EXPECT_THROW(halo.begin(copy), Broken);
     halo.arrive(put);
-    EXPECT_THROW(halo.place(std::vector<Index>(std::size_t(halo.n_ghosts()) + 1)), Broken);
+    EXPECT_THROW(halo.assign_slots(std::vector<Index>(std::size_t(halo.n_ghosts()) + 1)), Broken);
 
     if (p.size() > 0 && world().rank() == 0) p[field::position].set(0, Vector{NAN, 0, 0});
     EXPECT_THROW(domain.migrate(p), NumbersFailed); // on every rank

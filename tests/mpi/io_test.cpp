@@ -255,6 +255,6 @@ TEST_F(IoTest, ThePicturesAreTheSameForAnyNumberOfRanks)
             io::draw_pictures(SingleRank{}, task);
             EXPECT_EQ(io::read_text(dir / "alone.png"), io::read_text(io::picture_file(dir, k)));
         }
-    task.color = "sped"; // all ranks hear of it
+    task.color = "sped"; // all ranks fail together
     EXPECT_THROW(io::draw_pictures(world(), task), BadInput);
 }

@@ -262,7 +262,7 @@ TEST(Domain, RefusesWhatItCannotCut)
     EXPECT_THROW(d.block_of({0, NAN, 0}), NumbersFailed);
     EXPECT_THROW(d.block_of({1e30, 0, 0}), NumbersFailed);
     EXPECT_EQ(d.block_of({-0.1, 0.6, 0.5}), (Block{-1, 1, 1}));
-    // A rank with nonsense: all ranks hear of it.
+    // A rank with nonsense: all ranks fail together.
     Domain e(world(), {}, {0.5, 0.5, 0.5}, {false, false, false}, {}, {});
     std::vector<BlockWork> mine;
     if (world().rank() == world().size() - 1) mine.push_back({{0, 0, 0}, NAN, 1.0});

@@ -80,16 +80,16 @@ Tall tall(int aspect, const std::string& viscosity, double courant = 0)
 }
 
 /// Mean speed over that of the infinite slope, of a layer that slides for half a second.
-double layer(int rows, const std::string& surface, double tangent, double phi)
+double layer(int spacings, const std::string& surface, double tangent, double phi)
 {
     const double dx = 0.02, steep = 30 * pi / 180, width = 20 * dx;
     SceneText t;
     t.spacing = dx, t.end = 0.5, t.strength = fmt::format("friction_angle = {}\ncone = \"plane strain, no dilation\"", phi);
     t.space = periodic(width, -1, 2);
-    t.bodies = box("body", {0, 0, 0}, {width, 0, rows * dx});
+    t.bodies = box("body", {0, 0, 0}, {width, 0, spacings * dx});
     t.walls = box("wall", {0, 0, -4 * dx}, {width, 0, 0}, surface);
     t.effects = fmt::format("gravity = [{}, 0.0, {}]\n", gravity * std::sin(steep), -gravity * std::cos(steep)) + mild;
-    const double load = t.density * gravity * std::cos(steep), high = rows * dx, k0 = t.k0();
+    const double load = t.density * gravity * std::cos(steep), high = spacings * dx, k0 = t.k0();
     Simulation sim(Comm::world(), t.scene(), starting_with([&](Particles& p, Index i, Vector x) {
                        const double s = -load * (high - x.z);
                        set_stress(p, i, {k0 * s, k0 * s, s, 0, 0, 0});

@@ -48,10 +48,10 @@ private:
             const V w = V(j.volume) * model_.kernel.value(max(support - root<M::Kernel::divides>(max(dot(r, r), tiny)).root, zero));
             sums.difference = fma(w, Vec3<V>{j.vx - v.x, j.vy - v.y, j.vz - v.z}, sums.difference);
         }
-        Sums<Row<W>> rows;
-        widen<V>(sums, rows);
+        Sums<WideLanes<W>> wide;
+        widen<V>(sums, wide);
         Below::for_each_register(i, [&](const Lanes& lanes) {
-            const auto s = lanes_at<U, Sums<U>, Sums<Row<W>>, W>(rows, lanes.first);
+            const auto s = lanes_at<U, Sums<U>, Sums<WideLanes<W>>, W>(wide, lanes.first);
             const auto column = (*in.particles)[field::velocity];
             column.store(lanes.at, fma(U(epsilon), s.difference, column.template load<U>(lanes.at)), lanes.n);
         });

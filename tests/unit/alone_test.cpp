@@ -35,9 +35,9 @@ TEST(Alone, EveryCollectiveCallIsItsOwnAnswer)
     EXPECT_EQ(in[0].items, (std::vector<int>{1, 2}));
     EXPECT_EQ(in[1].items, std::vector<int>{3});
     EXPECT_TRUE(comm.exchange_scalar({}, 1.0).empty());
-    const auto place = comm.node_position();
-    EXPECT_EQ(place.size, 1);
-    EXPECT_EQ(place.nodes, 1);
+    const auto node = comm.node_position();
+    EXPECT_EQ(node.size, 1);
+    EXPECT_EQ(node.nodes, 1);
     EXPECT_FALSE(Comm::library().empty()); // asked without MPI
 }
 

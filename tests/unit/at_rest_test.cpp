@@ -142,8 +142,8 @@ TEST(AtRest, ReportedScenes)
     EXPECT_NEAR(greatest(boulder), 1850 * g * 1.95, 1e-3);
 }
 
-// The same bank whole, cut into polygons and into boxes: every point the same stress.
-TEST(AtRest, CutGroundHasTheStressOfTheWhole)
+// The same bank whole, split into polygons and into boxes: every point the same stress.
+TEST(AtRest, SplitGroundHasTheStressOfTheWhole)
 {
     const auto rectangle = [](double x1, double z1, double x2, double z2) { return Polygon{{{x1, z1}, {x2, z1}, {x2, z2}, {x1, z2}}, {}}; };
     const auto sorted = [](const Scene& s) {
@@ -160,12 +160,12 @@ TEST(AtRest, CutGroundHasTheStressOfTheWhole)
     for (const auto& pieces : {std::vector<Shape>{rectangle(0, 0, 2, 0.7), rectangle(0, 0.7, 1.05, 2), rectangle(1.05, 0.7, 2, 2)},
                                std::vector<Shape>{Polygon{{{0, 0}, {2, 0}, {2, 2}}, {}}, Polygon{{{0, 0}, {2, 2}, {0, 2}}, {}}},
                                std::vector<Shape>{Box{{0, 0, 0}, {2, 0, 1}}, Box{{0, 0, 1}, {0.6, 0, 2}}, rectangle(0.6, 1, 2, 2)}}) {
-        const auto cut = sorted(made(0.1, pieces));
-        ASSERT_EQ(cut.size(), whole.size());
+        const auto split = sorted(made(0.1, pieces));
+        ASSERT_EQ(split.size(), whole.size());
         for (std::size_t k = 0; k < whole.size(); ++k) {
-            EXPECT_EQ(cut[k][0], whole[k][0]);
-            EXPECT_EQ(cut[k][1], whole[k][1]);
-            EXPECT_NEAR(cut[k][2], whole[k][2], 1e-6 * 1850 * g * 2);
+            EXPECT_EQ(split[k][0], whole[k][0]);
+            EXPECT_EQ(split[k][1], whole[k][1]);
+            EXPECT_NEAR(split[k][2], whole[k][2], 1e-6 * 1850 * g * 2);
         }
     }
 }

@@ -210,7 +210,7 @@ book::WallLaw other_mirror(double least, double most, double sign = 1)
         return shown;
     };
 }
-/// A law that looks at the wall point: d_A = x_ij . n_j - d_B with the point's own normal and depth.
+/// A law that reads the wall point: d_A = x_ij . n_j - d_B with the point's own normal and depth.
 book::Shown mirrored_at_each_point(const book::Particle& i, const book::WallPoint& j, const scene::Contact&, double volume)
 {
     const double above = dot(i.x - j.x, j.normal) - j.depth;
@@ -289,7 +289,7 @@ TEST(ByTheBook, NoticesAFaultInAnyComponentOfL)
     }
 }
 
-// A wall law is one function: beside a plane the law that looks at each wall point says what today's says, beside a bent wall not.
+// A wall law is one function: beside a plane the law that reads each wall point says what today's says, beside a bent wall not.
 TEST(ByTheBook, AWallLawIsOneFunctionExchanged)
 {
     const double e = edge(3);

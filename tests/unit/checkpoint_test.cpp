@@ -197,7 +197,7 @@ TEST_F(CheckpointTest, AFlippedBitIsRefusedOrHarmless)
     const auto bits = 8 * std::filesystem::file_size(file);
     std::mt19937_64 random(5);
     int refused = 0, harmless = 0;
-    // The first kilobytes are nearly all the library's own structures; the rest mostly numbers.
+    // The first kilobytes are nearly all the library's own structures; the others mostly numbers.
     for (int k = 0; k < 400; ++k) {
         std::filesystem::copy_file(file, copy, std::filesystem::copy_options::overwrite_existing);
         flip_bit(copy, k % 2 ? random() % bits : random() % (8 * 4096));
@@ -221,7 +221,7 @@ TEST_F(CheckpointTest, AFlippedBitIsRefusedOrHarmless)
         ASSERT_LE(WEXITSTATUS(status), 1) << "flip " << k;
         (WEXITSTATUS(status) ? refused : harmless)++;
     }
-    EXPECT_GT(refused, 150); // the rest lies where nothing is stored
+    EXPECT_GT(refused, 150); // the others lie where nothing is stored
     RecordProperty("refused", refused);
     RecordProperty("harmless", harmless);
 }

@@ -1,5 +1,6 @@
 // The constitutive law at one material point, against closed forms: MAT-1 to MAT-12 of docs/verification.md, for double
 // and for lanes alike.
+#include "solver/core/simd.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include <gtest/gtest.h>
 #include <random>

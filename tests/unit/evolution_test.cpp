@@ -1,4 +1,5 @@
 // What changes the cone during a run, at one material point: softening, dilation decay, mu(I), still pore water.
+#include "solver/core/simd.hpp"
 #include "solver/effects/pore_water.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/scene/scene.hpp"

@@ -146,10 +146,10 @@ TEST_P(Fill, HalfOpenRegionsPartitionTheWhole)
 {
     const Filling filling(mixed(GetParam()));
     std::set<std::int64_t> seen;
-    const double cut[] = {-far, -0.7, 0.05, 0.85, 2.15, far}; // some lie on lattice points
+    const double bound[] = {-far, -0.7, 0.05, 0.85, 2.15, far}; // some lie on lattice points
     for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j) {
-            const Box r{{cut[i], -far, cut[j]}, {cut[i + 1], far, cut[j + 1]}};
+            const Box r{{bound[i], -far, bound[j]}, {bound[i + 1], far, bound[j + 1]}};
             filling.for_each_soil_in(r, [&](std::int64_t id, Vector x, int) {
                 if (x.x < r.high.x && x.z < r.high.z) {
                     EXPECT_TRUE(seen.insert(id).second);
@@ -218,9 +218,9 @@ TEST(Fill, RoundShapesAreCountedExactly)
     // Centred on a lattice point, so that many points lie on the surface: whole numbers tell how many are inside, and half of those on
     // the surface count, for of two opposite ones the interior is on the greater side of one.
     const auto expected = [](std::int64_t r, int across) {
-        const auto inside = [r](std::int64_t rest) { // twice the whole x with x^2 < rest, once those with x^2 = rest
+        const auto inside = [r](std::int64_t most) { // twice the whole x with x^2 < most, once those with x^2 = most
             std::int64_t x = r, on = 0;
-            while (x >= 0 && x * x >= rest) on += x * x == rest ? (x > 0 ? 2 : 1) : 0, --x;
+            while (x >= 0 && x * x >= most) on += x * x == most ? (x > 0 ? 2 : 1) : 0, --x;
             return (x < 0 ? 0 : 2 * (2 * x + 1)) + on;
         };
         std::int64_t sum = 0;
@@ -346,7 +346,7 @@ using Corners = std::vector<std::array<double, 2>>;
 /// The triangles from a point inside to the edges of a random polygon around it; empty if the draw was none.
 struct Star {
     Polygon whole;
-    std::vector<Polygon> cuts;
+    std::vector<Polygon> parts;
 };
 std::optional<Star> star(Draw& draw, double dx)
 {
@@ -359,7 +359,7 @@ std::optional<Star> star(Draw& draw, double dx)
         around.push_back({draw.coordinate(x, x, dx), draw.coordinate(z, z, dx)});
     }
     Star all{{around, {}}, {}};
-    // Pieces of two or three edges at times, cut off by two lines from the middle.
+    // Pieces of two or three edges at times, bounded by two lines from the middle.
     double sum = 0;
     for (int k = 0; k < n;) {
         const int edges = std::min(draw.whole(1, 3), n - k);
@@ -369,7 +369,7 @@ std::optional<Star> star(Draw& draw, double dx)
         if (crosses_itself({piece, {}}) || area({piece, {}}) <= 0.01 * dx * dx) return {};
         sum += area({piece, {}});
         if (draw.once_in(2)) std::reverse(piece.begin(), piece.end());
-        all.cuts.push_back({piece, {}});
+        all.parts.push_back({piece, {}});
     }
     if (crosses_itself(all.whole) || std::abs(sum - area(all.whole)) > 1e-9 * dx * dx) return {};
     return all;
@@ -393,7 +393,7 @@ void expect_the_same(const std::vector<Shape>& pieces, const Shape& whole, doubl
 
 } // namespace
 
-TEST(FillOfCuts, PolygonsCutFromAPointNeitherShareNorLoseAPoint)
+TEST(FillOfPieces, PolygonsSplitFromAPointNeitherShareNorLoseAPoint)
 {
     Draw draw(18);
     int done = 0;
@@ -406,17 +406,17 @@ TEST(FillOfCuts, PolygonsCutFromAPointNeitherShareNorLoseAPoint)
         Polygon whole = s->whole;
         whole.y = {draw.coordinate(-3 * dx, 0, dx), draw.coordinate(2 * dx, 4 * dx, dx)};
         std::vector<Shape> pieces;
-        for (auto cut : s->cuts) {
-            const double y = draw.coordinate(0, 1.4 * dx, dx); // cut along y too
+        for (auto part : s->parts) {
+            const double y = draw.coordinate(0, 1.4 * dx, dx); // split along y too
             if (dimensions == 2 || draw.once_in(2) || y < whole.y[0] + 1e-6 * dx || y > whole.y[1] - 1e-6 * dx) {
-                cut.y = whole.y;
-                pieces.push_back(cut);
+                part.y = whole.y;
+                pieces.push_back(part);
                 continue;
             }
-            cut.y = {whole.y[0], y};
-            pieces.push_back(cut);
-            cut.y = {y, whole.y[1]};
-            pieces.push_back(cut);
+            part.y = {whole.y[0], y};
+            pieces.push_back(part);
+            part.y = {y, whole.y[1]};
+            pieces.push_back(part);
         }
         expect_the_same(pieces, whole, dx, dimensions, fmt::format("polygon {} at a spacing of {}", done, dx));
         points += Lattice(whole, dx, dimensions).size();
@@ -429,8 +429,8 @@ TEST(FillOfCuts, PolygonsCutFromAPointNeitherShareNorLoseAPoint)
     EXPECT_GT(points, 10'000);
 }
 
-// The ends of some cuts lie on the middle of other edges, where corners are known to rounding only.
-TEST(FillOfCuts, PiecesThatMeetInTheMiddleOfAnEdge)
+// The ends of some pieces lie on the middle of other edges, where corners are known to rounding only.
+TEST(FillOfPieces, PiecesThatMeetInTheMiddleOfAnEdge)
 {
     Draw draw(19);
     for (int n = 0; n < 300; ++n) {
@@ -441,14 +441,14 @@ TEST(FillOfCuts, PiecesThatMeetInTheMiddleOfAnEdge)
         const double x = draw.coordinate(-5 * dx, 5 * dx, dx), z = draw.coordinate(-5 * dx, 5 * dx, dx), w = draw.whole(4, 12) * dx;
         const std::array<double, 2> a{x, z}, b{x + w, z}, c{x + w, z + w}, d{x, z + w};
         const auto share = [&] { return draw.once_in(2) ? draw.whole(1, 3) * 0.25 : draw.real(0.2, 0.8); };
-        // One half whole, the other cut from its corner to the middle of the diagonal, and one of those once more.
+        // One half whole, the other split from its corner to the middle of the diagonal, and one of those once more.
         const auto m = on(a, c, share()), q = on(d, m, share());
         expect_the_same({Polygon{{a, b, c}, {}}, Polygon{{a, m, d}, {}}, Polygon{{m, c, q}, {}}, Polygon{{q, c, d}, {}}},
                         Polygon{{a, b, c, d}, {}}, dx, 2, fmt::format("square {} at a spacing of {}", n, dx));
     }
 }
 
-TEST(FillOfCuts, CylindersCutAcrossTheirAxis)
+TEST(FillOfPieces, CylindersSplitAcrossTheirAxis)
 {
     Draw draw(20);
     for (int n = 0; n < 100; ++n) {
@@ -460,22 +460,22 @@ TEST(FillOfCuts, CylindersCutAcrossTheirAxis)
     }
 }
 
-TEST(FillOfCuts, BoxesCutAtWholeSpacings)
+TEST(FillOfPieces, BoxesSplitAtWholeSpacings)
 {
     Draw draw(21);
     for (int n = 0; n < 100; ++n) {
         const double dx = draw.spacing();
         const Vector low{draw.real(-9, 9), draw.real(-9, 9), draw.real(-9, 9)};
-        const int nx = draw.whole(2, 9), cut = draw.whole(1, nx - 1);
+        const int nx = draw.whole(2, 9), middle = draw.whole(1, nx - 1);
         const auto box = [&](int from, int to) {
             return Box{{low.x + from * dx, low.y, low.z}, {low.x + to * dx, low.y + 3 * dx, low.z + 2 * dx}};
         };
-        EXPECT_EQ(Lattice(box(0, cut), dx, 3).size() + Lattice(box(cut, nx), dx, 3).size(), Lattice(box(0, nx), dx, 3).size());
+        EXPECT_EQ(Lattice(box(0, middle), dx, 3).size() + Lattice(box(middle, nx), dx, 3).size(), Lattice(box(0, nx), dx, 3).size());
     }
 }
 
 // Round shapes, polygons and boxes that touch in a point, along a line or on a face: at most one of them has a point.
-TEST(FillOfCuts, TouchingShapesOfDifferentKindsShareNoPoint)
+TEST(FillOfPieces, TouchingShapesOfDifferentKindsShareNoPoint)
 {
     Draw draw(22);
     for (int n = 0; n < 200; ++n) {
@@ -499,7 +499,7 @@ TEST(FillOfCuts, TouchingShapesOfDifferentKindsShareNoPoint)
 }
 
 // A body that spans a period along lattice points fills it once, and so do two that meet in the middle.
-TEST(FillOfCuts, AcrossAPeriod)
+TEST(FillOfPieces, AcrossAPeriod)
 {
     const Corners bank{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
     for (const double dx : {0.1, 0.07, 1.0 / 3})
@@ -514,7 +514,7 @@ TEST(FillOfCuts, AcrossAPeriod)
 }
 
 // Points on the lower face of the space are in it, not an ulp outside, where they would belong to the other end of the period.
-TEST(FillOfCuts, NoPointLiesOutsideTheSpaceByRounding)
+TEST(FillOfPieces, NoPointLiesOutsideTheSpaceByRounding)
 {
     int on_the_face = 0;
     for (const double dx : {0.1, 0.07, 1.0 / 3})

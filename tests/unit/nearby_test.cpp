@@ -1,4 +1,4 @@
-// Shapes found by place: the same as when every one is asked, and few are asked.
+// Shapes found by position: the same as when every one is asked, and few are asked.
 #include "solver/scene/nearby.hpp"
 #include <gtest/gtest.h>
 #include <random>
@@ -10,10 +10,10 @@ namespace {
 
 std::vector<Box> random_boxes(int n, std::mt19937& random)
 {
-    std::uniform_real_distribution<double> place(-5, 5), size(0.01, 0.6);
+    std::uniform_real_distribution<double> coordinate(-5, 5), size(0.01, 0.6);
     std::vector<Box> boxes;
     for (int k = 0; k < n; ++k) {
-        const Vector low{place(random), place(random), place(random)};
+        const Vector low{coordinate(random), coordinate(random), coordinate(random)};
         boxes.push_back({low, {low.x + size(random), low.y + size(random), low.z + size(random)}});
     }
     if (n > 10) boxes[3] = {{-6, -6, -6}, {6, 6, -4}}; // a floor under all
@@ -31,20 +31,20 @@ bool apart(const Box& a, const Box& b, int dimensions)
 TEST(Nearby, FindsWhatAskingEverybodyFinds)
 {
     std::mt19937 random(1);
-    std::uniform_real_distribution<double> place(-7, 7);
+    std::uniform_real_distribution<double> coordinate(-7, 7);
     for (const int dimensions : {2, 3})
         for (const int n : {0, 1, 2, 50, 700}) {
             const auto boxes = random_boxes(n, random);
             const scene::Nearby near(boxes, dimensions);
             for (int k = 0; k < 500; ++k) {
-                Vector x{place(random), place(random), place(random)};
+                Vector x{coordinate(random), coordinate(random), coordinate(random)};
                 if (k % 3 == 0 && n > 0) x = boxes[std::size_t(k) % boxes.size()].high; // on a corner
-                std::vector<std::size_t> by_all, by_place;
+                std::vector<std::size_t> by_all, by_grid;
                 for (std::size_t b = 0; b < boxes.size(); ++b)
                     if (scene::contact(boxes[b], x, dimensions).distance <= 0) by_all.push_back(b);
-                near.any(x, [&](std::size_t b) { return by_place.push_back(b), false; });
-                std::sort(by_place.begin(), by_place.end());
-                ASSERT_EQ(by_place, by_all) << n << " boxes, " << dimensions << "-D";
+                near.any(x, [&](std::size_t b) { return by_grid.push_back(b), false; });
+                std::sort(by_grid.begin(), by_grid.end());
+                ASSERT_EQ(by_grid, by_all) << n << " boxes, " << dimensions << "-D";
             }
             for (const Box& box : boxes) {
                 const auto found = near.meeting(box);

@@ -50,7 +50,7 @@ int count(const Image& im, const io::Stage& s, bool (*of)(std::array<int, 3>))
 }
 
 const io::Quantity moved{"displacement", "m", io::Quantity::Map::Blues};
-const auto every_view = {scene::View::Oblique, scene::View::Side, scene::View::Top, scene::View::Cut};
+const auto every_view = {scene::View::Oblique, scene::View::Side, scene::View::Top, scene::View::Slice};
 
 /// A cube of soil on a floor.
 struct Cube {

@@ -29,9 +29,9 @@ TEST(Predict, TwoRanksOfTwoNodesByHand)
 {
     const auto m = plain();
     RankLoad r{
-        .pairs = 1e6, .particles = 2e4, .rim = 2000, .rows = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_rows = 1000};
+        .pairs = 1e6, .particles = 2e4, .rim = 2000, .sent = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_ghosts = 1000};
     const std::vector<RankLoad> even{r, r};
-    StepPlace at{.machine = m, .ranks = 2, .ranks_per_node = 1, .row_bytes = 100};
+    Deployment at{.machine = m, .ranks = 2, .ranks_per_node = 1, .ghost_bytes = 100};
     auto s = predict_step(even, at);
     // 1000 rows of 100 bytes: 0.1 ms on the wire and one latency, hidden behind 2.5 ms of pairs, 85 % of them interior.
     EXPECT_DOUBLE_EQ(s.network, 1e-6 + 1e-4);
@@ -61,7 +61,7 @@ TEST(Predict, CutsAsOftenAsItPays)
     const auto m = plain();
     const RankLoad r{.pairs = 1e7, .particles = 2e5, .messages = 1};
     const std::vector<RankLoad> ranks(64, r);
-    StepPlace at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
+    Deployment at{.machine = m, .ranks = 64, .ranks_per_node = 2, .blocks = 64000};
     const auto few = predict_step(ranks, at);
     // A cut's seconds C come every sqrt(2 C/(d t)) steps of t seconds, d = 6.1e-5 (35152/n)^0.56.
     const auto cut_of = [](const StepSeconds& s) { return 0.5 * s.recut * s.recut_steps; };
@@ -85,8 +85,8 @@ TEST(Predict, LoadsKnowNodes)
     cut.message = {{0, 1, 5}, {0, 2, 7}, {1, 0, 5}, {1, 3, 2}, {2, 0, 8}, {2, 3, 5}, {3, 1, 2}, {3, 2, 5}};
     const auto two = loads(cut, 2);
     EXPECT_EQ(two[0].far_messages, 1);
-    EXPECT_EQ(two[0].node_rows, 10) << "8 + 2 come in, 7 + 2 go out";
-    EXPECT_EQ(two[3].node_rows, 10) << "8 + 2 go out";
+    EXPECT_EQ(two[0].node_ghosts, 10) << "8 + 2 come in, 7 + 2 go out";
+    EXPECT_EQ(two[3].node_ghosts, 10) << "8 + 2 go out";
     EXPECT_DOUBLE_EQ(two[0].pairs, 100 + StepWork::wall * 20);
     EXPECT_EQ(loads(cut, 4)[0].far_messages, 0);
     EXPECT_EQ(loads(cut, 1)[0].far_messages, 2);

@@ -109,7 +109,7 @@ TEST(Keys, OnlyAWordThatIsLikeAnotherIsMeant)
     EXPECT_EQ(io::did_you_mean("rain", keys), ".");
 }
 
-TEST(Keys, WhatPeopleLookForAndDoNotFind)
+TEST(Keys, WhatPeopleSearchForAndDoNotFind)
 {
     for (const char* idea : {"rain", "Rainfall", "seepage", "vegetation", "roots", "ice"})
         EXPECT_THAT(io::not_simulated(idea), HasSubstr("not simulated")) << idea;

@@ -12,12 +12,12 @@
 
 namespace kuzure::measured {
 
-/// Walls of a scene whose events move them, in a step of `wall_dt` before one of `wall_next`, s; a little way on, where all go the same
-/// way.
+/// Walls of a scene whose events move them, in a step of `wall_dt` before one of `wall_next`, s;
+/// a little way on, where all go the same way.
 constexpr double wall_dt = 0.02, wall_next = 0.03;
-inline std::vector<WallPlace> places_of(const Scene& s)
+inline std::vector<WallPoses> poses_of(const Scene& s)
 {
-    std::vector<WallPlace> places(s.walls.size());
+    std::vector<WallPoses> poses(s.walls.size());
     const auto moving = scene::moving_walls(s);
     const auto velocity = [&](int w) {
         return std::ranges::find_if(s.events, [&](const auto& e) { return e.move->wall == s.walls[std::size_t(w)].name; })->move->velocity;
@@ -26,10 +26,10 @@ inline std::vector<WallPlace> places_of(const Scene& s)
     for (const int w : moving) together = together && velocity(w) == velocity(moving[0]);
     for (const int w : moving) {
         const Vector v = velocity(w), on = together ? 0.01 * v : Vector{};
-        auto& place = places[std::size_t(w)];
-        place.before.shift = on - wall_dt * v, place.after.shift = on, place.later.shift = on + (0.6 * wall_next) * v;
+        auto& pose = poses[std::size_t(w)];
+        pose.before.shift = on - wall_dt * v, pose.after.shift = on, pose.later.shift = on + (0.6 * wall_next) * v;
     }
-    return places;
+    return poses;
 }
 
 /// Energies of particles passed together, J.
@@ -61,8 +61,8 @@ public:
         state(cloud_.particles);
         model_->make_records(cloud_.particles, cloud_.soils, {});
         if (scene::any_wall_moves(cloud_.scene)) {
-            const auto places = places_of(cloud_.scene);
-            model_->place_walls({places, wall_dt, wall_next, false});
+            const auto poses = poses_of(cloud_.scene);
+            model_->place_walls({poses, wall_dt, wall_next, false});
         }
         start_ = cloud_.particles;
     }

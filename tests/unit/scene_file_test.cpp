@@ -138,7 +138,7 @@ std::vector<fs::path> corpus(const char* folder)
     return files;
 }
 
-/// The rest of the first line, behind a marker.
+/// What of the first line stands behind a marker.
 std::string first_line(const std::string& text, const std::string& marker)
 {
     EXPECT_TRUE(text.starts_with(marker)) << text.substr(0, 60);
@@ -474,7 +474,7 @@ TEST(SceneKeys, WordsMeanTheirValues)
     EXPECT_EQ(with("accuracy.precision=double").accuracy.precision, scene::Precision::Double);
     EXPECT_EQ(with("accuracy.correction=gradient").accuracy.correction, scene::Correction::Gradient);
     EXPECT_EQ(with("wall.0.surface=smooth").walls[0].surface, scene::Surface::Smooth);
-    EXPECT_EQ(with("output.picture.view=cut").output.picture->view, scene::View::Cut);
+    EXPECT_EQ(with("output.picture.view=cut").output.picture->view, scene::View::Slice);
     EXPECT_EQ(with("output.picture.color=pressure").output.picture->color, scene::Color::Pressure);
     for (const auto& preset : io::presets()) EXPECT_EQ(with(("accuracy.preset=" + preset.name).c_str()).accuracy.preset, preset.value);
 }

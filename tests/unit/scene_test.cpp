@@ -275,7 +275,7 @@ TEST(Scene, MassIsHeldAgainstTheShapesVolume)
 {
     auto s = column();
     EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 0, 1e-12);
-    // Ten rows of 9 to 0 points: the slanted face lies on lattice points and looks to greater coordinates.
+    // Ten rows of 9 to 0 points: the slanted face lies on lattice points and faces greater coordinates.
     s.bodies[0].shape = Polygon{{{0, 0}, {1, 0}, {0, 1}}, {0, 1}};
     EXPECT_NEAR(excess_of_mass(s, Filling(s), 0), 450.0 / 500 - 1, 1e-12);
     EXPECT_THAT(warning(s, "body.0.polygon"), HasSubstr("hold 10 % less mass than its volume would"));

@@ -158,19 +158,19 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         }
         kept.push_back(k);
     }
-    const auto places = places_of(s);
+    const auto poses = poses_of(s);
     std::vector<scene::Wall> walls = s.walls;
-    for (std::size_t w = 0; w < walls.size(); ++w) walls[w].shape = book::shifted(walls[w].shape, places[w].after.shift);
+    for (std::size_t w = 0; w < walls.size(); ++w) walls[w].shape = book::shifted(walls[w].shape, poses[w].after.shift);
     const auto ground = book::ground(walls, period_of(s), s.dimensions, s.space.spacing);
     std::vector<book::GroundPoint> points;
     for (const auto& w : c.walls)
         for (std::size_t k = 0; k < w.x.size(); ++k) {
-            const Vector at = Vector{w.x[k], w.y[k], w.z[k]} + places[std::size_t(w.wall)].after.shift;
+            const Vector at = Vector{w.x[k], w.y[k], w.z[k]} + poses[std::size_t(w.wall)].after.shift;
             points.push_back({at, book::exposed_faces(ground, s.walls, at, s.support()), w.wall});
             if (planted.of_wall) planted.of_wall(points.back());
         }
     book::Setting setting{s.interactions(), c.soils, s.walls, damping};
-    for (const auto& p : places) {
+    for (const auto& p : poses) {
         setting.motion.push_back((1 / wall_dt) * (p.after.shift - p.before.shift));
         setting.next_motion.push_back((1 / wall_next) * (p.later.shift - p.after.shift));
     }
@@ -256,7 +256,7 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         a = std::max(a, length(read.forced[i].acceleration)), L = std::max(L, norm(read.strain[i].L));
         rate = std::max(rate, norm(read.forced[i].stress_rate));
     }
-    for (const auto& p : places_of(c.scene)) speed = std::max(speed, length(p.after.shift - p.before.shift) / wall_dt);
+    for (const auto& p : poses_of(c.scene)) speed = std::max(speed, length(p.after.shift - p.before.shift) / wall_dt);
     const double of_a = std::max(a, stress / (density * h)), of_L = std::max(L, speed / h), of_stress = std::max(stress, dt * stiff * of_L);
     const double of_energy =
         volume * std::max(of_stress, density * of_a * h) * std::max({of_L * dt, of_stress / stiff, of_a * dt * dt / h});
@@ -548,7 +548,7 @@ TEST(StaggeredByTheBook, NoticesAPlantedFaultInTheWalls)
                 mistaken.walls = {wall(3, other, dimensions)};
                 if (other != surface) expect_noticed(by_the_book(c, &mistaken), surfaces[other]);
             }
-            expect_noticed(by_the_book(c, nullptr, {.at_end_of_step = true}), "places at the end of the step");
+            expect_noticed(by_the_book(c, nullptr, {.at_end_of_step = true}), "positions at the end of the step");
             const auto covered = [](book::GroundPoint& w) {
                 if (w.x.x > 3 * dx) w.faces.clear();
             };

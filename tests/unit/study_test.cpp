@@ -84,10 +84,10 @@ TEST(Sweep, PointsStartFromTheBaseAndOwnPresetsFromThoseOfKuzure)
     EXPECT_EQ(s.points[0].curve, "base");
     EXPECT_EQ(s.points[1].curve, "slow");
     const auto& sets = s.points[1].sets;
-    const auto place = [&](const std::string& set) { return std::find(sets.begin(), sets.end(), set) - sets.begin(); };
+    const auto index_of = [&](const std::string& set) { return std::find(sets.begin(), sets.end(), set) - sets.begin(); };
     // what is written overrides what it starts from
-    EXPECT_LT(place("space.h=1.2"), place("space.h=1.7"));
-    EXPECT_LT(place("space.h=1.7"), std::ptrdiff_t(sets.size()));
+    EXPECT_LT(index_of("space.h=1.2"), index_of("space.h=1.7"));
+    EXPECT_LT(index_of("space.h=1.7"), std::ptrdiff_t(sets.size()));
     EXPECT_EQ(sets.back(), "accuracy.cfl=0.1");
 }
 TEST(Sweep, BadOnesAreRefusedWithFileLineKeyAndRemedy)

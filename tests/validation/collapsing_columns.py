@@ -179,7 +179,7 @@ def sensitivity(case, base):
     )
 
 
-def sweep(case, kind, aspects):
+def aspect_series(case, kind, aspects):
     rows = []
     for a in aspects:
         m = measure(run(scene(kind, a), "V-EXP-3", f"{kind}-{a:g}", minutes=40), kind, a)
@@ -215,10 +215,10 @@ def sweep(case, kind, aspects):
     return rows
 
 
-def draw(case, swept):
+def draw(case, series):
     panels = []
     a = np.geomspace(0.4, 25, 120)
-    for kind, rows in swept.items():
+    for kind, rows in series.items():
         curves = case.curve(
             kind, **{k: np.array([m[k] for m in rows]) for k in ("a", "runout", "runout_history", "height", "moving", "seconds")}
         )
@@ -233,7 +233,7 @@ def draw(case, swept):
             panels.append(
                 f"set title '{'plane strain' if kind == 'plane' else 'axisymmetric'}'; set ylabel '{what}'; plot " + ", ".join(plots)
             )
-    rows_of_panels = len(swept)
+    rows_of_panels = len(series)
     figure(
         "collapsing_columns_runout",
         f"set multiplot layout {rows_of_panels},2\nset logscale xy; set xrange [0.4:25]; set xlabel 'aspect ratio a = H0/L0'\n"
@@ -249,13 +249,13 @@ def main(quick=False, slow=False):
         control(case)
         return case.done()
     aspects = {kind: sorted(ASPECTS[kind] + (SLOW[kind] if slow else [])) for kind in ASPECTS}
-    swept = {"plane": sweep(case, "plane", aspects["plane"])}
-    base = next(m for m in swept["plane"] if m["a"] == 2)
+    series = {"plane": aspect_series(case, "plane", aspects["plane"])}
+    base = next(m for m in series["plane"] if m["a"] == 2)
     record_gate_at_2(case, base)
     control(case)
     sensitivity(case, base)
-    swept["axisymmetric"] = sweep(case, "axisymmetric", aspects["axisymmetric"])
-    draw(case, swept)
+    series["axisymmetric"] = aspect_series(case, "axisymmetric", aspects["axisymmetric"])
+    draw(case, series)
     return case.done()
 
 

@@ -1,5 +1,5 @@
 #pragma once
-// Generated ground, drawn in many ways: one ground and soil from a seed, and the same again cut into other pieces, joined, with the
+// Generated ground, drawn in many ways: one ground and soil from a seed, and the same again split into other pieces, joined, with the
 // period's faces elsewhere, mirrored, turned, with another list skin. What is drawn otherwise must act alike (drawing_test.cpp).
 //
 // Ground is either a profile in x-z (slopes, steps, flats; drawn out along y in 3-D) or a heap of bricks on the lattice. Soil is placed by
@@ -108,10 +108,10 @@ inline Profile draw_profile(Draw& draw, double width, bool periodic)
     return p;
 }
 /// One line from the foot to the top; the ground left and right of it is drawn apart.
-struct CutLine {
+struct Divider {
     double foot, top; // x, m
 };
-inline std::vector<scene::Wall> pieces(const Profile& p, const std::vector<CutLine>& cuts, Draw& draw, bool as_boxes)
+inline std::vector<scene::Wall> pieces(const Profile& p, const std::vector<Divider>& dividers, Draw& draw, bool as_boxes)
 {
     std::vector<scene::Wall> walls;
     const auto lattice = [](double a) { return std::fabs(a - snapped(a)) < 1e-9; };
@@ -124,15 +124,15 @@ inline std::vector<scene::Wall> pieces(const Profile& p, const std::vector<CutLi
         else wall.shape = scene::Polygon{points, {y0, y1}};
         walls.push_back(wall);
     };
-    for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
-        const auto &a = cuts[k], &b = cuts[k + 1];
+    for (std::size_t k = 0; k + 1 < dividers.size(); ++k) {
+        const auto &a = dividers[k], &b = dividers[k + 1];
         std::vector<Corner> points{{a.foot, p.foot}, {b.foot, p.foot}};
-        // corners of the top from b back to a; at a step in a cut the near side's
+        // corners of the top from b back to a; at a step in a divider the near side's
         std::vector<Corner> top;
         for (const auto& c : p.top)
             if (c[0] > a.top + 1e-9 && c[0] < b.top - 1e-9) top.push_back(c);
         const auto side = [&](double x, double inwards) { return Corner{x, p.height(x + inwards * 1e-7)}; };
-        const auto exactly = [&](double x, double inwards) { // a corner of the profile where the cut is
+        const auto exactly = [&](double x, double inwards) { // a corner of the profile where the divider is
             Corner c = side(x, inwards);
             for (const auto& q : p.top)
                 if (std::fabs(q[0] - x) < 1e-9 && std::fabs(q[1] - c[1]) < 1e-5) c = q;
@@ -152,7 +152,7 @@ inline std::vector<scene::Wall> pieces(const Profile& p, const std::vector<CutLi
         if (p.depth > 0 && draw.chance(0.5)) y = {0, snapped(draw.between(0.2, 0.8) * p.depth), p.depth};
         const bool upright = a.foot == a.top && b.foot == b.top;
         for (std::size_t s = 0; s + 1 < y.size(); ++s) {
-            if (upright && cuts.size() > 2 && draw.chance(0.5)) {
+            if (upright && dividers.size() > 2 && draw.chance(0.5)) {
                 double level = draw.between(p.foot + 0.6 * spacing, lowest - 0.6 * spacing);
                 if (draw.chance(0.5)) level = snapped(level);
                 if (level < p.foot + 0.5 * spacing || level > lowest - 0.5 * spacing) level = p.foot + 2 * spacing;
@@ -169,10 +169,10 @@ inline std::vector<scene::Wall> pieces(const Profile& p, const std::vector<CutLi
 inline std::vector<scene::Wall> draw_ground(const Profile& p, Draw& draw, bool many, double seam = 0)
 {
     const double width = p.top.back()[0];
-    std::vector<CutLine> cuts{{0, 0}, {width, width}};
+    std::vector<Divider> dividers{{0, 0}, {width, width}};
     const bool two = p.border > 0 && p.border < width;
-    if (two) cuts.push_back({p.border, p.border});
-    if (seam > 0 && !(two && std::fabs(seam - p.border) < 1e-9)) cuts.push_back({seam, seam});
+    if (two) dividers.push_back({p.border, p.border});
+    if (seam > 0 && !(two && std::fabs(seam - p.border) < 1e-9)) dividers.push_back({seam, seam});
     if (many)
         for (int k = draw.whole(1, 6); k > 0; --k) {
             double top = draw.between(2 * spacing, width - 2 * spacing), foot = top;
@@ -183,16 +183,16 @@ inline std::vector<scene::Wall> draw_ground(const Profile& p, Draw& draw, bool m
             for (double t = 0.02; t < 0.99; t += 0.02)
                 inside = inside && p.foot + t * (p.height(top) - p.foot) < p.height(foot + t * (top - foot)) - 0.02 * spacing;
             if (!inside) foot = top;
-            const bool clear = std::ranges::all_of(cuts, [&](const CutLine& c) {
+            const bool clear = std::ranges::all_of(dividers, [&](const Divider& c) {
                 const double a = c.top - top, b = c.foot - foot;
                 return a * b > 0 && std::min(std::fabs(a), std::fabs(b)) > 1.2 * spacing;
             });
             const bool near_corner = std::ranges::any_of(
                 p.top, [&](const Corner& c) { return std::fabs(c[0] - top) < 0.05 * spacing && std::fabs(c[0] - top) > 1e-9; });
-            if (clear && !near_corner) cuts.push_back({foot, top});
+            if (clear && !near_corner) dividers.push_back({foot, top});
         }
-    std::ranges::sort(cuts, {}, [](const CutLine& c) { return c.top; });
-    auto walls = pieces(p, cuts, draw, many);
+    std::ranges::sort(dividers, {}, [](const Divider& c) { return c.top; });
+    auto walls = pieces(p, dividers, draw, many);
     if (many) // in any order
         for (std::size_t k = walls.size(); k > 1; --k) std::swap(walls[k - 1], walls[std::size_t(draw.whole(0, int(k) - 1))]);
     return walls;
@@ -217,8 +217,8 @@ inline Bricks draw_bricks(Draw& draw, int dimensions, bool periodic)
     if (periodic && draw.chance(0.5)) b.heights.back() = b.heights.front();
     return b;
 }
-/// Cuts a block until every piece is full or empty, and sometimes further.
-inline void cut(const Bricks& b, std::array<int, 3> low, std::array<int, 3> high, Draw& draw, bool many, std::vector<scene::Wall>& walls)
+/// Splits a block until every piece is full or empty, and sometimes further.
+inline void split(const Bricks& b, std::array<int, 3> low, std::array<int, 3> high, Draw& draw, bool many, std::vector<scene::Wall>& walls)
 {
     bool full = true, empty = true;
     for (int i = low[0]; i < high[0]; ++i)
@@ -245,7 +245,7 @@ inline void cut(const Bricks& b, std::array<int, 3> low, std::array<int, 3> high
         if (at <= low[std::size_t(axis)]) continue;
         auto middle_high = high, middle_low = low;
         middle_high[std::size_t(axis)] = middle_low[std::size_t(axis)] = at;
-        cut(b, low, middle_high, draw, many, walls), cut(b, middle_low, high, draw, many, walls);
+        split(b, low, middle_high, draw, many, walls), split(b, middle_low, high, draw, many, walls);
         return;
     }
 }
@@ -254,8 +254,8 @@ inline std::vector<scene::Wall> draw_ground(const Bricks& b, Draw& draw, bool ma
     std::vector<scene::Wall> walls;
     const int highest = *std::ranges::max_element(b.heights);
     const int between = int(std::round(seam / spacing)), wide = b.nx * b.wide, deep = b.dimensions == 3 ? b.ny * b.wide : 1;
-    if (between > 0) cut(b, {0, 0, b.foot}, {between, deep, highest}, draw, many, walls);
-    cut(b, {between, 0, b.foot}, {wide, deep, highest}, draw, many, walls);
+    if (between > 0) split(b, {0, 0, b.foot}, {between, deep, highest}, draw, many, walls);
+    split(b, {between, 0, b.foot}, {wide, deep, highest}, draw, many, walls);
     return walls;
 }
 
@@ -308,8 +308,8 @@ inline Generated generate(unsigned seed)
     const auto draw_all = [&](const auto& ground) {
         g.drawings.push_back({draw_ground(ground, draw, false)});
         g.drawings.push_back({draw_ground(ground, draw, true), {}, draw.between(0.05, 0.5), 0, "cut"});
-        // Of two faces that are equally near, as at a brick's edge, the one that looks up, then along x counts: such ground may be cut, but
-        // unless it is rough not turned, without a difference.
+        // Of two faces that are equally near, as at a brick's edge, the one that faces up, then along x counts: such ground may be divided,
+        // but unless it is rough not turned, without a difference.
         const bool even = bricks && surface != 0, turned = g.dimensions == 3 && bricks && draw.chance(0.5);
         Drawing again{{}, {}, draw.between(0.05, 0.5), 0, "cut"};
         if (g.periodic)
@@ -500,7 +500,7 @@ inline Placed block_above(const Generated& g, Draw& draw, bool moving = true)
     return p;
 }
 struct Motions {
-    double apart = 0;            // largest difference of a place from the first drawing's, over the block's size
+    double apart = 0;            // largest difference of a position from the first drawing's, over the block's size
     double taken = 0, given = 0; // most and least work taken by walls, over the largest energy met till then
     double moved = 0;            // m, farthest way up or down in the first drawing
 };

@@ -65,7 +65,7 @@ TEST(Lists, PairsOfAStepAreThoseOfAllParticles)
                     const auto before = sim.pairs();
                     sim.step();
                     const auto expected = all_pairs(sim); // forces are those of where the step leads
-                    // in mixed precision places are rounded to h/2^20: a pair on the very edge may count or not
+                    // in mixed precision positions are rounded to h/2^20: a pair on the very edge may count or not
                     EXPECT_NEAR(double(sim.pairs() - before), double(expected), std::string(precision) == "mixed" ? 2 : 0)
                         << name << ", step " << sim.steps();
                     ASSERT_GT(expected, 1000) << name;

@@ -81,13 +81,13 @@ TEST(Sleep, NoSleeperIsMissedByAWave)
     std::int64_t sleepers = 0;
     while (!sim.finished()) {
         std::map<std::int64_t, bool> slept;
-        const bool before_look = sim.steps() % every == 0 && sim.steps() > 0;
-        if (before_look)
+        const bool before_detection = sim.steps() % every == 0 && sim.steps() > 0;
+        if (before_detection)
             each(sim, [&](Index i) {
                 slept[sim.particles()[field::id][i]] = sim.particles()[field::activity][i] == std::int32_t(Activity::Asleep);
             });
         sim.step();
-        if (before_look)
+        if (before_detection)
             each(sim, [&](Index i) {
                 if (!slept[sim.particles()[field::id][i]]) return;
                 ++sleepers;

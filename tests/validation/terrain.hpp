@@ -70,7 +70,7 @@ struct GroundScene {
     }
 };
 
-/// Mean place (m) of all particles.
+/// Mean position (m) of all particles.
 inline Vector centre(const Simulation& sim)
 {
     Vector sum;

@@ -148,11 +148,11 @@ TEST(Terrain, ParticlesStandOnTheGroundWithItsVolume)
         EXPECT_EQ(soil.count_in(part), inside);
         ground.for_each_in(part, [&](std::int64_t, Vector x) { EXPECT_LT(x.z, r.bed->at(x.x, x.y).z); });
     }
-    // Control: the plain cubic lattice, cut by a slope of 45 degrees, misses the volume.
+    // Control: the plain cubic lattice, bounded by a slope of 45 degrees, misses the volume.
     const double dx = 0.25;
-    const scene::Lattice cut(scene::Polygon{{{0, 0}, {4, -4}, {4, -3.3}, {0, 0.7}}, {0.0, 4.0}}, dx, 3);
+    const scene::Lattice plain(scene::Polygon{{{0, 0}, {4, -4}, {4, -3.3}, {0, 0.7}}, {0.0, 4.0}}, dx, 3);
     EXPECT_FALSE(
-        c.control("volume on the plain lattice, 45 deg, 0.7 m thick", 4 * 4 * 0.7, double(cut.size()) * dx * dx * dx, "m^3", 0.005));
+        c.control("volume on the plain lattice, 45 deg, 0.7 m thick", 4 * 4 * 0.7, double(plain.size()) * dx * dx * dx, "m^3", 0.005));
 }
 
 TEST(Terrain, BlockSlidesDownHoweverTheGridLies)
@@ -236,7 +236,7 @@ TEST(Terrain, SandRestsOnWavesAndAtAStep)
 
 TEST(Terrain, SoilTornOpenAtTheRimOfItsPitDoesNotSink)
 {
-    // A mass cut two metres into a slope climbs over the lower rim and is torn open there: it bears no pressure, the ground holds it out.
+    // A mass set two metres into a slope climbs over the lower rim and is torn open there: it bears no pressure, the ground holds it out.
     Case c("terrain-pit");
     GroundScene g;
     g.text.spacing = 0.5, g.text.young = 1e7, g.text.end = 3.5;

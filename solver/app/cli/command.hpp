@@ -55,7 +55,7 @@ void complain(const std::string& text) noexcept;
 
 /// The program's version, git hash, compiler and instruction set.
 std::string version_text();
-/// The libraries that its answers rest on, and their versions.
+/// The libraries that its answers depend on, and their versions.
 std::string packages_text();
 
 /// The path by which this program is started again: itself, or the launcher where it is one of several that a package

@@ -27,7 +27,7 @@ Exit scale(const Comm& comm, const Arguments& a)
     const auto [s, scene_warnings, filling] = a.scene.read(comm);
     io::MachineProfile machine = machine_named(a.machine);
     const auto model = choose_model(s, Arithmetic::Simd);
-    const double bytes = double(row_bytes(*model)), reach = list_reach(s);
+    const double bytes = double(ghost_bytes(*model)), reach = list_reach(s);
     const Estimate e = estimate(s, filling, *model);
     const auto state = a.from.empty() ? State() : state_of(comm, s, a.from);
 

@@ -21,12 +21,12 @@ enum class Status { NotRun, Finished, Failed, Refused, Stopped };
 const char* word(Part);
 const char* word(Status);
 
-/// The maps of a run, cut to where soil came.
+/// The maps of a run, cropped to where soil came.
 struct RunMaps {
     scene::MapGrid grid; // of all its cells, map coordinates
     std::int64_t column = 0, row = 0, columns = 0, rows = 0;
     std::vector<float> thickness, pressure, arrival; // m, kPa, s; NaN where it did not come
-    double reach = 0;                                // m, from the centre of the mass to the farthest place where it was maps.wet thick
+    double reach = 0;                                // m, from the centre of the mass to the farthest point where it was maps.wet thick
     double volume = 0;                               // m^3, on the maps at the end
 };
 /// Of a run's directory. Throws BadInput, IoFailed.
@@ -82,7 +82,7 @@ inline constexpr int enough_members = 3;
 
 /// Reach, interval, sensitivity; no files. Of at least one finished run.
 Answer answer_of(const Base&, const std::vector<Run>&);
-/// The rasters, outlines and pictures into DIR/maps and points.csv, each whole at once; fills in what the answer says of places.
+/// The rasters, outlines and pictures into DIR/maps and points.csv, each whole at once; fills in what the answer says of points.
 void write_maps(const Base&, Answer&, const std::vector<io::NamedPoint>&, const io::Path& directory);
 
 } // namespace kuzure::hazard

@@ -124,7 +124,7 @@ Extent extent_of(const scene::Grid& g)
     if (high_i < 0) return {};
     return {low_i, low_j, high_i - low_i + 1, high_j - low_j + 1};
 }
-scene::Grid cut_out(const scene::Grid& g, Extent e)
+scene::Grid cropped(const scene::Grid& g, Extent e)
 {
     scene::Grid out;
     if (e.columns == 0) return out;
@@ -133,7 +133,7 @@ scene::Grid cut_out(const scene::Grid& g, Extent e)
         for (int i = e.column; i < e.column + e.columns; ++i) out.values.push_back(g.at(i, j));
     return out;
 }
-scene::Grid cut_out(const scene::Grid& g) { return cut_out(g, extent_of(g)); }
+scene::Grid cropped(const scene::Grid& g) { return cropped(g, extent_of(g)); }
 
 double area_of(const std::vector<scene::Area>& areas)
 {
@@ -187,11 +187,11 @@ RunMaps read_maps(const io::Path& run, const Base& base, double wet)
     const Extent e = extent_of(h);
     m.column = e.column, m.row = e.row, m.columns = e.columns, m.rows = e.rows;
     const auto kept = [&](const scene::Grid& g) {
-        const auto values = cut_out(g, e).values;
+        const auto values = cropped(g, e).values;
         return std::vector<float>(values.begin(), values.end());
     };
     m.thickness = kept(h), m.pressure = kept(p), m.arrival = kept(a);
-    const scene::Grid thickness = cut_out(h, e); // where it counts as reached, for the outline
+    const scene::Grid thickness = cropped(h, e); // where it counts as reached, for the outline
     if (e.columns == 0) return m;
     const double x = base.scene.map_frame.x + base.centre.x, y = base.scene.map_frame.y + base.centre.y;
     for (const auto& area : scene::areas_above(thickness, wet * (1 - 1e-6)))
@@ -277,7 +277,7 @@ using Outlines = std::vector<io::MapPicture::Outline>;
 /// Where 5, 50 and 95 % of the runs come: written, and their areas told.
 Outlines write_outlines(const io::Raster& probability, const std::string& crs, const io::Place& folder, Answer& answer)
 {
-    const auto near = cut_out(probability.grid);
+    const auto near = cropped(probability.grid);
     Outlines outlines;
     for (const auto& [percent, area] : {std::pair{5, &answer.area_05}, std::pair{50, &answer.area_50}, std::pair{95, &answer.area_95}}) {
         outlines.push_back({percent / 100.0, scene::areas_above(near, percent / 100.0), fmt::format("{} %", percent)});
@@ -297,7 +297,7 @@ void draw_maps(const Base& base, const Layers& from, const scene::MapGrid& grid,
     const scene::HeightField* ground = scene::ground_of(base.scene);
     for (const auto which : {from.reach, from.arrival + 1, from.thickness + 2}) {
         const auto& l = from.all[which];
-        io::MapPicture picture{l.kind, base.scene.title, cut_out(raster_of(grid, crs, l.values).grid), {}, outlines};
+        io::MapPicture picture{l.kind, base.scene.title, cropped(raster_of(grid, crs, l.values).grid), {}, outlines};
         if (ground)
             picture.ground = [&, ground](double x, double y) {
                 return ground->at(x - base.scene.map_frame.x, y - base.scene.map_frame.y).z;

@@ -21,8 +21,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* mark = "fit_plan.json";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step
-/// Times the layers of the best run, for particles at other places: enough to move all of them, too few for another answer.
-constexpr std::array twin_layers{1.08, 1.17};
+/// Times the layers of the best run, for particles at other positions: enough to move all of them, too few for another answer.
+constexpr std::array repeat_layers{1.08, 1.17};
 /// Below it soil is recorded too, so that outlines can be drawn through the cells in between.
 constexpr double recorded = 0.1;
 
@@ -79,12 +79,12 @@ public:
         constexpr double patience = 1000; // s: without a deadline; a run that is stopped gets some of it for its checkpoint
         queue_.emplace(
             base_, out_, within_ > 0 ? within_ : patience, [this] { return left(); }, [this] { return stop_->came(); },
-            [this] { look_at_new_ones(); });
+            [this] { compare_new_runs(); });
         if (within_ > 0 && !layers_.given && !fixed_spacing_) choose_layers();
         begin_runs();
 
         search();
-        if (!over()) twins();
+        if (!over()) repeat_best();
         if (!over()) search();
         return end();
     }
@@ -211,7 +211,7 @@ private:
     }
 
     /// By how much misfits differ that cannot be told apart.
-    double alike() const { return std::max({of_cells_, scatter_of(trials()), std::isnan(of_twins_) ? 0 : of_twins_}); }
+    double alike() const { return std::max({of_cells_, scatter_of(trials()), std::isnan(of_repeats_) ? 0 : of_repeats_}); }
 
     void search()
     {
@@ -238,7 +238,7 @@ private:
     {
         const int together = std::min<int>(jobs_, int(todo.size()));
         queue_->work(todo, jobs_, std::max(1, cores_ / together), within_ > 0 ? mean_seconds() : 0);
-        look_at_new_ones();
+        compare_new_runs();
         return std::ranges::all_of(todo, [](const Run* r) { return r->status != Status::NotRun && r->status != Status::Stopped; });
     }
     double mean_seconds() const
@@ -250,9 +250,9 @@ private:
         return n > 0 ? sum / n : 0;
     }
 
-    void look_at_new_ones()
+    void compare_new_runs()
     {
-        for (auto* list : {&tried_, &twins_})
+        for (auto* list : {&tried_, &repeats_})
             for (auto& t : *list) {
                 if (!t.run->finished() || !std::isnan(t.compared.misfit)) continue;
                 t.compared = compare(observed_, out_ / t.run->directory, base_, cell_, wet_);
@@ -260,43 +260,45 @@ private:
                 for (std::size_t k = 0; k < axes_.size(); ++k)
                     values.push_back(fmt::format("{} {:.4g}{}", axes_[k].name, axes_[k].value(t.at[k]), unit_of(axes_[k])));
                 say(fmt::format("    {}{}: overlap {:.1f} %, reach {:+.3g} m{}", fmt::join(values, ", "),
-                                list == &twins_ ? ", once more" : "", 100 * t.compared.overlap, t.compared.reach_error,
+                                list == &repeats_ ? ", once more" : "", 100 * t.compared.overlap, t.compared.reach_error,
                                 observed_.deposit ? fmt::format(", thickness off by {:.3g} m rms", t.compared.rms) : ""));
             }
     }
 
-    /// The best values once more with particles at other places: what comes out otherwise is not the input's doing.
-    void twins()
+    /// The best values once more with particles at other positions: what comes out otherwise is not the input's doing.
+    void repeat_best()
     {
         const auto v = judge(axes_, trials(), alike());
         if (!v || v->at_end) return;
         if (fixed_spacing_) return;
         std::vector<Run*> todo;
-        for (const double more : twin_layers) {
+        for (const double more : repeat_layers) {
             const double wanted = spacing_ / more, spacing = possible_spacing(base_, wanted);
-            if (std::fabs(spacing / wanted - 1) > 0.01) continue; // boxes hold whole layers: another volume is no twin
+            if (std::fabs(spacing / wanted - 1) > 0.01) continue; // boxes hold whole layers: another volume is no repeat
             auto& r = queue_->add(Part::Finer, member_at(v->best), spacing, fmt::format("runs/twin-{:.3g}", base_.layers_of(spacing)));
-            twins_.push_back({&r, v->best, {}});
+            repeats_.push_back({&r, v->best, {}});
             todo.push_back(&r);
         }
-        twins_wanted_ = !todo.empty();
+        repeats_wanted_ = !todo.empty();
         if (todo.empty()) return;
         work(todo);
         double low = v->misfit, high = v->misfit;
         bool any = false;
-        for (const auto& t : twins_)
+        for (const auto& t : repeats_)
             if (t.run->finished()) low = std::min(low, t.compared.misfit), high = std::max(high, t.compared.misfit), any = true;
         if (!any) return;
-        of_twins_ = high - low;
+        of_repeats_ = high - low;
     }
 
     // ---- what is published
 
     BackState state(bool final)
     {
-        BackState s{.base = base_, .scene_file = args_.scene.file, .observed = observed_, .axes = axes_, .tried = tried_, .twins = twins_};
+        BackState s{
+            .base = base_, .scene_file = args_.scene.file, .observed = observed_, .axes = axes_, .tried = tried_, .repeats = repeats_};
         s.verdict = judge(axes_, trials(), alike());
-        s.alike = alike(), s.of_cells = of_cells_, s.of_twins = of_twins_, s.of_curve = scatter_of(trials()), s.cell = cell_, s.wet = wet_;
+        s.alike = alike(), s.of_cells = of_cells_, s.of_repeats = of_repeats_, s.of_curve = scatter_of(trials()), s.cell = cell_,
+        s.wet = wet_;
         s.spacing = spacing_, s.layers = base_.layers_of(spacing_), s.ended = now(), s.final = final;
         if (s.verdict) s.moving = moving_of(s.best());
         if (final) s.not_done = not_done();
@@ -328,7 +330,7 @@ private:
         if (waiting > 0 || !next_trials(axes_, trials(), alike()).empty())
             all.push_back(
                 {"the search: no time was left to go closer; the same command goes on", "探索の続き: 時間切れ(同じコマンドで続行)"});
-        if (twins_wanted_ && std::isnan(of_twins_))
+        if (repeats_wanted_ && std::isnan(of_repeats_))
             all.push_back({"the best values with particles at other places: the interval stands on the cells and the curve's scatter alone",
                            "粒子配置を変えた再計算: 区間は格子と曲線のばらつきだけによります"});
         return all;
@@ -395,10 +397,10 @@ private:
     Observed observed_;
     io::Path out_;
     int cores_ = 1, jobs_ = 1;
-    double spacing_ = 0, cell_ = 0, wet_ = 0, of_cells_ = 0, of_twins_ = nan;
-    bool twins_wanted_ = false;
+    double spacing_ = 0, cell_ = 0, wet_ = 0, of_cells_ = 0, of_repeats_ = nan;
+    bool repeats_wanted_ = false;
     Json plan_;
-    std::vector<Tried> tried_, twins_;
+    std::vector<Tried> tried_, repeats_;
     std::optional<Queue> queue_;
     std::optional<io::Ownership> owner_;
     std::optional<study::StopRequest> stop_;

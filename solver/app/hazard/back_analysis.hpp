@@ -36,9 +36,9 @@ struct BackState {
     std::string scene_file;
     const Observed& observed;
     const std::vector<Axis>& axes;
-    std::vector<Tried> tried, twins; // twins: the best values with the particles at other places
+    std::vector<Tried> tried, repeats; // repeats: the best values with the particles at other positions
     std::optional<Verdict> verdict = {};
-    double alike = 0, of_cells = 0, of_curve = 0, of_twins = 0; // misfits; of_twins NaN: not known
+    double alike = 0, of_cells = 0, of_curve = 0, of_repeats = 0; // misfits; of_repeats NaN: not known
     double cell = 0, wet = 0, layers = 0, spacing = 0, ended = 0;
     double moving = 0; // kinetic energy at the end of the best run over its greatest
     bool final = false;

@@ -46,7 +46,7 @@ public:
         s += verdict() + cards();
         s += section(id("curve").c_str(), t("The misfit", "不適合度"), curves());
         s += section(id("map").c_str(), t("The best run and the event", "最良の計算と実際の範囲"), map());
-        s += section(id("rests").c_str(), t("What it rests on", "この結果の前提"), rests());
+        s += section(id("rests").c_str(), t("What it rests on", "この結果の前提"), basis());
         s += section(id("runs").c_str(), t("The runs", "計算の一覧"), runs());
         return s + "</article>\n";
     }
@@ -78,7 +78,7 @@ private:
                   fmt::format("{:+.1f} %", 100 * (c.area / s_.observed.area - 1)));
         if (s_.observed.deposit)
             s += card(t("thickness off by", "厚さの誤差"), fmt::format("{} m", shown(c.rms)), t("root mean square", "二乗平均平方根"));
-        s += card(t("runs", "計算"), fmt::format("{}", s_.tried.size() + s_.twins.size()));
+        s += card(t("runs", "計算"), fmt::format("{}", s_.tried.size() + s_.repeats.size()));
         s += card(t("layers of particles", "粒子の層数"), fmt::format("{:.3g}", s_.layers), t("over the mean thickness", "平均厚さあたり"));
         return s + "</dl>\n";
     }
@@ -139,7 +139,7 @@ private:
         return s;
     }
 
-    std::string rests() const
+    std::string basis() const
     {
         std::string rows;
         const auto row = [&](const std::string& name, const std::string& value) {
@@ -157,7 +157,7 @@ private:
         row(t("cannot be told apart within", "区別できない不適合度の差"),
             fmt::format("{:.2g} ({} {:.2g}, {} {:.2g}, {} {})", s_.alike, t("cells", "格子"), s_.of_cells,
                         t("scatter of the curve", "曲線のばらつき"), s_.of_curve, t("particles at other places", "粒子配置"),
-                        std::isnan(s_.of_twins) ? "–" : fmt::format("{:.2g}", s_.of_twins)));
+                        std::isnan(s_.of_repeats) ? "–" : fmt::format("{:.2g}", s_.of_repeats)));
         row(t("program", "プログラム"), version_text());
         return fmt::format("<table class=\"text\"><thead><tr><th>{}</th><th>{}</th></tr></thead><tbody>\n{}</tbody></table>\n",
                            t("what", "項目"), t("value", "値"), rows);
@@ -177,7 +177,7 @@ private:
                                 escaped(word(one.run->status)));
         };
         for (const auto& one : in_order(s_.tried)) line(one);
-        for (const auto& one : s_.twins) line(one);
+        for (const auto& one : s_.repeats) line(one);
         return fmt::format(
             "<div class=\"scroll\"><table><thead><tr><th>{}</th>{}<th>{}</th><th>{}</th><th>{}</th><th>{}</th></tr></thead><tbody>\n{}"
             "</tbody></table></div>\n",
@@ -282,7 +282,7 @@ Json run_json(const BackState& s, const Tried& one)
 /// What is listed in fit.json, by its name there.
 Json lists_of(const BackState& s)
 {
-    Json inputs = Json::array(), misfit = Json::array(), runs = Json::array(), twins = Json::array(), not_done = Json::array(),
+    Json inputs = Json::array(), misfit = Json::array(), runs = Json::array(), repeats = Json::array(), not_done = Json::array(),
          says = Json::array();
     for (const auto& a : s.axes) inputs.push_back({{"name", a.name}, {"unit", a.unit}, {"low", a.low}, {"high", a.high}});
     for (const auto& one : in_order(s.tried)) {
@@ -293,10 +293,11 @@ Json lists_of(const BackState& s)
         row.push_back(one.compared.misfit);
         misfit.push_back(row);
     }
-    for (const auto& one : s.twins) twins.push_back(run_json(s, one));
+    for (const auto& one : s.repeats) repeats.push_back(run_json(s, one));
     for (const auto& w : s.not_done) not_done.push_back(w.en);
     for (const auto& w : meaning(s)) says.push_back(w.en);
-    return {{"inputs", inputs}, {"misfit", misfit}, {"runs", runs}, {"particles_elsewhere", twins}, {"not_done", not_done}, {"says", says}};
+    return {{"inputs", inputs},     {"misfit", misfit}, {"runs", runs}, {"particles_elsewhere", repeats},
+            {"not_done", not_done}, {"says", says}};
 }
 
 Json to_json(const BackState& s)
@@ -336,7 +337,7 @@ Json to_json(const BackState& s)
             {"more_than_one_answer", v.split},
             {"misfit", lists["misfit"]},
             {"best_run", run_json(s, s.best())},
-            {"alike", {{"misfit", s.alike}, {"cells", s.of_cells}, {"curve", s.of_curve}, {"particles", number(s.of_twins)}}},
+            {"alike", {{"misfit", s.alike}, {"cells", s.of_cells}, {"curve", s.of_curve}, {"particles", number(s.of_repeats)}}},
             {"moving_at_end", s.moving},
             {"says", lists["says"]},
             {"layers", s.layers},

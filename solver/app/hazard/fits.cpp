@@ -56,8 +56,8 @@ Found on(const io::MachineProfile& m, int ranks, const Estimate& e, double withi
     f.plan.layers = layers;
     for (double at = layers; at <= most_layers && waves * one(at) <= 0.6 * left; at += 0.1) f.plan.layers = at;
     f.plan.seconds = waves * one(f.plan.layers);
-    const double rest = 0.85 * (left - f.plan.seconds);
-    for (double at = 1.15 * f.plan.layers; at <= most_layers && together(at) <= rest; at += 0.1) f.plan.finer = at;
+    const double spare = 0.85 * (left - f.plan.seconds);
+    for (double at = 1.15 * f.plan.layers; at <= most_layers && together(at) <= spare; at += 0.1) f.plan.finer = at;
     if (f.plan.finer > 0) f.plan.seconds += together(f.plan.finer);
     return f;
 }

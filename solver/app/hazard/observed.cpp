@@ -86,7 +86,7 @@ bool is_outline(const io::Path& file)
 }
 
 /// Throws BadInput for an event beside the map; notes what is doubtful.
-void look_where_it_lies(Observed& o, const Base& base, const scene::Filling& filling)
+void locate(Observed& o, const Base& base, const scene::Filling& filling)
 {
     const auto grid = scene::map_grid(base.scene, filling);
     const auto& f = base.scene.map_frame;
@@ -162,7 +162,7 @@ Observed read_observed(const std::string& file, const Base& base, const scene::F
             o.perimeter += std::hypot(next[0] - ring[k][0], next[1] - ring[k][1]);
         }
 
-    look_where_it_lies(o, base, filling);
+    locate(o, base, filling);
     return o;
 }
 

@@ -28,7 +28,7 @@ public:
         s += section(id("when").c_str(), t("By when", "いつ届くか"), when());
         s += section(id("sure").c_str(), t("How sure", "どのくらい確かか"), sure());
         s += section(id("decides").c_str(), t("What decides", "何が結果を左右するか"), decides());
-        s += section(id("rests").c_str(), t("What the answer rests on", "この答えの前提"), rests());
+        s += section(id("rests").c_str(), t("What the answer rests on", "この答えの前提"), basis());
         s += section(id("not").c_str(), t("What is not in it", "含まれていないもの"), missing());
         s += section(id("runs").c_str(), t("The runs", "計算の一覧"), runs());
         return s + "</article>\n";
@@ -174,7 +174,7 @@ private:
                                  "区間が 0 を含まなければ、いちばん上の入力を次に測るべきです。"));
     }
 
-    std::string rests() const
+    std::string basis() const
     {
         std::string rows;
         const auto row = [&](const std::string& name, const std::string& value) {

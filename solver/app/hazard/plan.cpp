@@ -64,10 +64,9 @@ double parse_within(const std::string& text)
         seconds += x * (unit == 's' ? 1 : unit == 'm' ? 60 : 3600), unit_last = true;
     }
     if (!good || !(seconds >= 1 && seconds <= 30 * 86400.0))
-        throw BadInput(
-            fmt::format("--within: expected a time from 1 s to 30 days, found \"{}\"; write, for example, --within 30m, 90s, 2h or "
-                        "1h30m",
-                        text));
+        throw BadInput(fmt::format("--within: expected a time from 1 s to 30 days, found \"{}\"; "
+                                   "write, for example, --within 30m, 90s, 2h or 1h30m",
+                                   text));
     return seconds;
 }
 

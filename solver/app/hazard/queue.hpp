@@ -13,8 +13,8 @@ using study::say, study::seconds_text;
 
 class Queue {
 public:
-    /// `left`: seconds to the deadline. `stopped`: whether a signal came. `after_each`: when a run has ended. Needs a living
-    /// study::StopRequest.
+    /// `left`: seconds to the deadline. `stopped`: whether a signal came. `after_each`: when a run has ended.
+    /// Needs a living study::StopRequest.
     Queue(const Base& base, io::Path directory, double within, std::function<double()> left, std::function<bool()> stopped,
           std::function<void()> after_each)
         : base_(base), out_(std::move(directory)), within_(within), left_(std::move(left)), stopped_(std::move(stopped)),

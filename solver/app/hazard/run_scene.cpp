@@ -152,7 +152,7 @@ bool has_box(const Scene& s)
 
 double height_error(const scene::HeightError& e, std::uint64_t seed, double x, double y)
 {
-    // Normal numbers at the points of a square grid, smoothed by quadratic B-splines and scaled so that each place has the same spread. No
+    // Normal numbers at the points of a square grid, smoothed by quadratic B-splines and scaled so that each point has the same spread. No
     // function of a mathematics library comes in, whose last digits differ between machines.
     const auto normal = [&](std::int64_t i, std::int64_t j) {
         // Of neighbours and of other seeds nothing in common.

@@ -40,7 +40,7 @@ struct RunScene {
 /// `inputs`: a directory for rasters and outlines of its own, which it makes where it needs them. Throws BadInput, IoFailed.
 RunScene run_scene(const Base&, double spacing, const Member&, const std::string& title, const io::Path& inputs);
 
-/// The error of heights (m) at a place of the map: normal but for its farthest tails, alike over error.length.
+/// The error of heights (m) at a point of the map: normal but for its farthest tails, alike over error.length.
 double height_error(const scene::HeightError&, std::uint64_t seed, double x, double y);
 
 } // namespace kuzure::hazard

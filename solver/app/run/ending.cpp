@@ -110,7 +110,7 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     if (outputs.maps() && !outputs.maps()->summary().is_null()) j["maps"] = outputs.maps()->summary();
     if (facts_.with_twins && code == Exit::Ok) {
         io::on_root(comm_, [&] { j["error_bars"] = study::error_bars(scene_, directory_.path(), facts_.peak_speed, facts_.twins); });
-        if (messages_.speaks())
+        if (messages_.prints())
             for (const auto& line : study::error_bar_lines(j["error_bars"])) messages_.say(line);
     }
     io::write_json(comm_, directory_.summary(), j);

@@ -58,7 +58,7 @@ Fronts measure_fronts(const Comm& comm, const Particles& p, const Scene& s, cons
     columns.reserve(mine.size());
     for (const auto& [key, c] : mine) columns.push_back(c);
     if (comm.size() > 1) {
-        // Columns that several ranks share are put together by a rank that their place decides, squares of them by one, so
+        // Columns that several ranks share are put together by a rank that their position decides, squares of them by one, so
         // that no rank ever holds them all.
         std::map<int, std::vector<Column>> to;
         for (const Column& c : columns) {

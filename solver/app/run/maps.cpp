@@ -81,7 +81,7 @@ private:
 };
 
 /// The cells in a box around all of them, in the coordinates of the scene.
-scene::Grid cut_out(const std::vector<MapCell>& cells, const scene::MapGrid& grid, double elsewhere, double (*value)(const MapCell&))
+scene::Grid smallest_grid(const std::vector<MapCell>& cells, const scene::MapGrid& grid, double elsewhere, double (*value)(const MapCell&))
 {
     std::int64_t low[2] = {grid.columns, grid.rows}, high[2] = {-1, -1};
     for (const auto& c : cells) {
@@ -305,7 +305,7 @@ std::vector<io::MapPicture::Outline> Maps::outlines(const std::vector<MapCell>& 
 {
     std::vector<io::MapPicture::Outline> all;
     if (scene_.maps->limits.empty()) return all;
-    auto thickness = cut_out(cells, record_.grid(), 0, [](const MapCell& c) { return c.memory.thickness; });
+    auto thickness = smallest_grid(cells, record_.grid(), 0, [](const MapCell& c) { return c.memory.thickness; });
     thickness.x += scene_.map_frame.x, thickness.y += scene_.map_frame.y;
     for (const double limit : scene_.maps->limits) all.push_back({limit, scene::areas_above(thickness, limit), {}});
     return all;
@@ -340,7 +340,7 @@ void Maps::write_pictures(const io::Place& folder, const std::vector<MapCell>& c
         io::MapPicture picture{.kind =
                                    *std::ranges::find(io::map_kinds, name, [](const io::MapKind& k) { return std::string_view(k.name); }),
                                .title = scene_.title,
-                               .values = cut_out(
+                               .values = smallest_grid(
                                    cells, record_.grid(), nan,
                                    name == "h_max" ? [](const MapCell& c) { return reached(c) ? c.memory.thickness : nan; }
                                                    : [](const MapCell& c) { return reached(c) ? c.memory.arrival : nan; }),

@@ -8,7 +8,7 @@ void Messages::say(const std::string& text)
 {
     if (status_) status_->make_room();
     // Not by fmt, which throws: a run goes on when its messages cannot be written.
-    if (speaks_) std::fputs((text + "\n").c_str(), stdout), std::fflush(stdout);
+    if (prints_) std::fputs((text + "\n").c_str(), stdout), std::fflush(stdout);
 }
 
 void Messages::warn(const std::string& text)
@@ -25,7 +25,7 @@ void Messages::say_aloud(const std::string& text)
 
 void Messages::begin_status(Progress progress, double end, double begin, std::int64_t step)
 {
-    status_.emplace(speaks_, progress, end, begin, step);
+    status_.emplace(prints_, progress, end, begin, step);
 }
 
 } // namespace kuzure

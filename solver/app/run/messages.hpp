@@ -11,14 +11,14 @@ class Messages {
 public:
     /// root: this is rank 0, the only one that says anything. quiet: nothing on standard output. twin: its warnings are those of the run it
     /// belongs to and are kept only.
-    Messages(bool root, bool quiet, bool twin) : speaks_(root && !quiet), warns_(root && !twin), ends_(root && quiet && !twin) {}
+    Messages(bool root, bool quiet, bool twin) : prints_(root && !quiet), warns_(root && !twin), ends_(root && quiet && !twin) {}
     /// A line on standard output.
     void say(const std::string&);
     /// A warning, kept for the summary.
     void warn(const std::string&);
     /// A line even where the run is quiet: then on standard error.
     void say_aloud(const std::string&);
-    bool speaks() const { return speaks_; }
+    bool prints() const { return prints_; }
     const std::vector<std::string>& warnings() const { return warnings_; }
 
     /// Begins the status line; arguments as StatusLine's.
@@ -28,7 +28,7 @@ public:
     void show(const Status& s, bool final) { status_->show(s, final); }
 
 private:
-    bool speaks_, warns_, ends_;
+    bool prints_, warns_, ends_;
     std::optional<StatusLine> status_;
     std::vector<std::string> warnings_;
 };

@@ -87,18 +87,18 @@ void Outputs::write_maps(Simulation& sim)
 void Outputs::take_back(const Simulation& sim)
 {
     open(sim.time());
-    told_ = std::min(told_, sim.happened().size());
+    reported_ = std::min(reported_, sim.happened().size());
     if (maps_) maps_->take_back(sim.time());
 }
 
 std::vector<std::string> Outputs::write_events(const Simulation& sim)
 {
     std::vector<std::string> words;
-    const auto news = sim.happened().subspan(told_);
-    told_ = sim.happened().size();
-    if (news.empty()) return words;
+    const auto fresh_events = sim.happened().subspan(reported_);
+    reported_ = sim.happened().size();
+    if (fresh_events.empty()) return words;
     std::vector<io::EventRow> rows;
-    for (const auto& h : news) {
+    for (const auto& h : fresh_events) {
         const auto& event = scene_.events[std::size_t(h.event)];
         std::string what = scene::in_words(scene_, event);
         words.push_back(fmt::format("t = {:.6g} s, event {}{}: {}", h.time, h.event,

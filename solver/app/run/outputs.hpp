@@ -54,7 +54,7 @@ private:
     std::optional<io::EventLog> events_; // of a scene that has some
     std::optional<io::ForceLog> forces_;
     std::optional<io::ProbeLog> probes_;
-    std::size_t told_ = 0; // events of Simulation::happened() that are written
+    std::size_t reported_ = 0; // events of Simulation::happened() that are written
     std::optional<double> residual_;
     std::optional<Fronts> fronts_;
     std::optional<Maps> maps_;

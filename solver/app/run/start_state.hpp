@@ -8,7 +8,7 @@
 namespace kuzure {
 
 struct StartState {
-    Particles particles; // rows on any rank: place, velocity, density, stress, what soil remembers, id, soil; origin is the place
+    Particles particles; // rows on any rank: position, velocity, density, stress, what soil remembers, id, soil; origin is the position
     std::string from;    // the checkpoint
     double time = 0;     // s, of the other run
 };

@@ -36,15 +36,15 @@ const std::vector<std::string>& progress_names()
     return names;
 }
 
-StatusLine::StatusLine(bool speaks, Progress how, double end, double begin, std::int64_t step)
-    : speaks_(speaks && how != Progress::None), bar_(how == Progress::Bar || (how == Progress::Auto && own_terminal())), end_(end),
+StatusLine::StatusLine(bool prints, Progress how, double end, double begin, std::int64_t step)
+    : prints_(prints && how != Progress::None), bar_(how == Progress::Bar || (how == Progress::Auto && own_terminal())), end_(end),
       start_(wall_clock()), last_(start_), time_(begin), step_(step)
 {
 }
 
 bool StatusLine::due(bool final) const
 {
-    if (!speaks_) return false;
+    if (!prints_) return false;
     const double t = wall_clock();
     // A log of a long run stays short: every ten seconds at first, every fiftieth of the time gone by later.
     return final || t - last_ >= (bar_ ? 0.5 : std::max(10.0, (t - start_) / 50));

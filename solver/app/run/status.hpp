@@ -28,7 +28,7 @@ const std::vector<std::string>& progress_names();
 class StatusLine {
 public:
     /// end, begin: simulated times, s; step: that of begin.
-    StatusLine(bool speaks, Progress, double end, double begin, std::int64_t step);
+    StatusLine(bool prints, Progress, double end, double begin, std::int64_t step);
     /// True if something should be shown now. `final`: whatever the clock says.
     bool due(bool final) const;
     void show(const Status&, bool final);
@@ -39,11 +39,11 @@ public:
 
     /// The words alone; rate in steps/s, left in s of wall time (negative: unknown).
     static std::string text(const Status&, double end, double rate, double left);
-    /// As many of the words as the columns hold, none of them cut.
+    /// As many of the words as the columns hold, none of them in part.
     static std::string shortened(const std::string& text, std::size_t columns);
 
 private:
-    bool speaks_, bar_, standing_ = false; // standing: the cursor is behind a bar
+    bool prints_, bar_, standing_ = false; // standing: the cursor is behind a bar
     double end_, start_, last_;            // s; wall clock
     double time_;                          // s, simulated, when last shown
     std::int64_t step_;

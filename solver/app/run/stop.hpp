@@ -15,7 +15,7 @@ public:
           began_(a.began.value_or(start)), last_checkpoint_(wall_clock())
     {
     }
-    /// What this rank asks of the step to come. The files are looked at once a second, by rank 0.
+    /// What this rank asks of the step to come. The files are polled once a second, by rank 0.
     Requests now();
     /// A checkpoint was just written.
     void checkpoint_written() { last_checkpoint_ = wall_clock(); }
@@ -25,7 +25,7 @@ private:
     const RunArguments& args_;
     double interval_; // s
     const io::ResultDirectory& directory_;
-    double began_, last_checkpoint_, last_look_ = 0; // s of wall_clock()
+    double began_, last_checkpoint_, last_poll_ = 0; // s of wall_clock()
     bool by_file_ = false;
 };
 

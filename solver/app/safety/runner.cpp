@@ -200,7 +200,7 @@ private:
         }
         if (t.seen.size() > legs) t.seen.clear();
         t.outcome = judge(setting_, t.seen);
-        // Looks at a run of which no state is left are no help for what is still to be run.
+        // Inspections of a run of which no state is left are no help for what is still to be run.
         if (t.outcome != Outcome::Open && t.name != "settled") return;
         if (!study::has_checkpoint(run_of(t.name))) t.seen.clear(), t.outcome = Outcome::Open;
         begin_anew_without_checkpoint(t.name);
@@ -222,7 +222,7 @@ private:
         Trial& t = trial(r.step);
         require_ended(t.name, ended);
         const int leg = int(t.seen.size());
-        t.seen.push_back(look(setting_, run_of(t.name), leg > 0 ? end_of_leg(setting_, leg - 1) : 0, end_of_leg(setting_, leg)));
+        t.seen.push_back(inspect(setting_, run_of(t.name), leg > 0 ? end_of_leg(setting_, leg - 1) : 0, end_of_leg(setting_, leg)));
         t.seconds += wall_clock() - r.began;
         t.outcome = judge(setting_, t.seen);
         keep(t);
@@ -348,7 +348,7 @@ private:
             const auto [results, scene] = open_results(comm_, run_of(t.name));
             auto task = picture_task(scene, results);
             task.color = "plastic_strain", task.range = {};
-            task.view = setting_.base.output.picture ? setting_.base.output.picture->view : scene::View::Cut; // it lies inside
+            task.view = setting_.base.output.picture ? setting_.base.output.picture->view : scene::View::Slice; // it lies inside
             task.at = HUGE_VAL;
             task.file = [&](int) { return io::Place(out_ / name); };
             for (const auto& w : io::draw_pictures(comm_, task).warnings) complain("warning: " + w);

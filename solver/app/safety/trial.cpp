@@ -103,7 +103,7 @@ Scene trial_scene(const Setting& setting, double factor, const io::Path& start)
     return s;
 }
 
-Seen look(const Setting& s, const io::Path& results, double before, double end)
+Seen inspect(const Setting& s, const io::Path& results, double before, double end)
 {
     const auto at = [&](double time) {
         auto state = io::read_snapshot(io::snapshot_next_to(results, time));

@@ -40,7 +40,7 @@ struct Seen {
     double unbalanced = 0;   // of gravity, 1: the force that this creep needs against the damping
 };
 /// From the snapshots of a trial at the ends of a leg and of the one before. Throws IoFailed.
-Seen look(const Setting&, const io::Path& results, double before, double end);
+Seen inspect(const Setting&, const io::Path& results, double before, double end);
 
 enum class Outcome { Open, Holds, Fails };
 const char* word(Outcome);

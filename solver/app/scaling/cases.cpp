@@ -50,15 +50,16 @@ State state_of(const Comm& comm, const Scene& s, const io::Path& from)
     return {std::move(x), std::move(way)};
 }
 
-Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e, StepPlace at, const std::vector<Vector>& x, Method method)
+Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e, Deployment at, const std::vector<Vector>& x,
+                Method method)
 {
     const int n = at.ranks;
     const BlockSpace space = block_space(s, filling, n);
     Case c{n,
            (n + at.ranks_per_node - 1) / at.ranks_per_node,
            double(at.machine.node.cores) / at.ranks_per_node * n,
-           x.empty() ? share_out(StartSoil(s, filling, space), n, list_reach(s), at.row_bytes, method)
-                     : share_out(StateSoil(s, filling, space, x), n, list_reach(s), at.row_bytes, method),
+           x.empty() ? share_out(StartSoil(s, filling, space), n, list_reach(s), at.ghost_bytes, method)
+                     : share_out(StateSoil(s, filling, space, x), n, list_reach(s), at.ghost_bytes, method),
            {},
            {},
            {}};
@@ -68,7 +69,7 @@ Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e
     at.latency_times = 2, c.slow_messages = predict_step(load, at);
     at.latency_times = 1, at.bandwidth_times = 0.5, c.thin_wires = predict_step(load, at);
     for (const auto& r : c.cut.rank)
-        c.memory = std::max(c.memory, e.memory / double(e.soil) * double(r.work.particles) + (2 * at.row_bytes + 32) * double(r.ghosts));
+        c.memory = std::max(c.memory, e.memory / double(e.soil) * double(r.work.particles) + (2 * at.ghost_bytes + 32) * double(r.ghosts));
     c.memory += bytes_per_process;
     return c;
 }
@@ -99,10 +100,10 @@ nlohmann::ordered_json to_json(const std::vector<ReplayedCut>& cuts)
     return all;
 }
 
-nlohmann::ordered_json to_json(const Case& c, double row_bytes, bool per_rank)
+nlohmann::ordered_json to_json(const Case& c, double ghost_bytes, bool per_rank)
 {
-    std::int64_t rows = 0, messages = 0;
-    for (const auto& r : c.cut.rank) rows += r.rows, messages += r.messages;
+    std::int64_t sent = 0, messages = 0;
+    for (const auto& r : c.cut.rank) sent += r.sent, messages += r.messages;
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     nlohmann::ordered_json j{
@@ -114,12 +115,12 @@ nlohmann::ordered_json to_json(const Case& c, double row_bytes, bool per_rank)
         {"work_balance", c.cut.balance()},
         {"scattered_ranks", c.cut.scattered},
         {"ghost_share", c.cut.ghost_share()},
-        {"halo_bytes_per_step", std::int64_t(double(rows) * row_bytes)},
+        {"halo_bytes_per_step", std::int64_t(double(sent) * ghost_bytes)},
         {"messages_per_step", messages},
         {"largest_rank",
          {{"soil", most(c.cut, [](const RankShare& r) { return r.work.particles; })},
           {"ghosts", most(c.cut, [](const RankShare& r) { return r.ghosts; })},
-          {"halo_bytes_per_step", std::int64_t(row_bytes) * most(c.cut, [](const RankShare& r) { return r.rows; })},
+          {"halo_bytes_per_step", std::int64_t(ghost_bytes) * most(c.cut, [](const RankShare& r) { return r.sent; })},
           {"messages_per_step", most(c.cut, [](const RankShare& r) { return r.messages; })},
           {"memory_bytes", std::int64_t(c.memory)}}},
         {"predicted_seconds_per_step", c.step.total()},
@@ -137,12 +138,12 @@ nlohmann::ordered_json to_json(const Case& c, double row_bytes, bool per_rank)
                                      {"soil_pairs", r.work.soil_pairs},
                                      {"wall_pairs", r.work.wall_pairs},
                                      {"ghosts", r.ghosts},
-                                     {"halo_bytes", r.rows * std::int64_t(row_bytes)},
+                                     {"halo_bytes", r.sent * std::int64_t(ghost_bytes)},
                                      {"messages", r.messages}});
     return j;
 }
 
-std::string to_text(const std::vector<Case>& cases, const Scene& s, const StepPlace& at, std::int64_t soil, const std::string& state)
+std::string to_text(const std::vector<Case>& cases, const Scene& s, const Deployment& at, std::int64_t soil, const std::string& state)
 {
     std::string text;
     const auto add = [&]<class... T>(fmt::format_string<T...> format, T&&... values) {
@@ -157,7 +158,7 @@ std::string to_text(const std::vector<Case>& cases, const Scene& s, const StepPl
         add("{:>7}{:>7}{:>8.0f}{:>10}{:>11}{:>9.3f}{:>9.3f}{:>10}{:>11.1f}{:>9.0f}{:>10.3f}{:>10.3f}{:>8.2f}\n", c.ranks, c.nodes, c.cores,
             c.cut.blocks, most(c.cut, [](const RankShare& r) { return r.work.particles; }), c.cut.pair_balance(), c.cut.ghost_share(),
             most(c.cut, [](const RankShare& r) { return r.messages; }),
-            1e-3 * at.row_bytes * double(most(c.cut, [](const RankShare& r) { return r.rows; })), 1e-6 * c.memory, 1e3 * c.step.total(),
+            1e-3 * at.ghost_bytes * double(most(c.cut, [](const RankShare& r) { return r.sent; })), 1e-6 * c.memory, 1e3 * c.step.total(),
             c.efficiency, c.cut.cut_seconds);
     }
     add("\npredicted step, ms\n{:>7}{:>10}{:>10}{:>11}{:>9}{:>11}{:>9}{:>9}{:>16}{:>16}\n", "ranks", "pairs", "particles", "imbalance",

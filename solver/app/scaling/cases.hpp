@@ -22,14 +22,14 @@ struct State {
 /// Collective. Throws BadInput where there is no checkpoint, or another scene's.
 State state_of(const Comm&, const Scene&, const io::Path& from);
 
-/// Counts the cut for the ranks of a place and predicts a step there; efficiency is left at 1. `x`: the soil's positions, m, or none for
-/// those of the start.
-Case count_case(const Scene&, const scene::Filling&, const Estimate&, StepPlace, const std::vector<Vector>& x, Method);
+/// Counts the cut for the ranks of a deployment and predicts a step of it; efficiency is left at 1. `x`: the soil's positions, m, or none
+/// for those of the start.
+Case count_case(const Scene&, const scene::Filling&, const Estimate&, Deployment, const std::vector<Vector>& x, Method);
 
 nlohmann::ordered_json to_json(const std::vector<ReplayedCut>&);
-/// `row_bytes`: of a ghost's record.
-nlohmann::ordered_json to_json(const Case&, double row_bytes, bool per_rank);
+/// `ghost_bytes`: of a ghost's record.
+nlohmann::ordered_json to_json(const Case&, double ghost_bytes, bool per_rank);
 /// Tables for people; `state` says which soil was counted.
-std::string to_text(const std::vector<Case>&, const Scene&, const StepPlace&, std::int64_t soil, const std::string& state);
+std::string to_text(const std::vector<Case>&, const Scene&, const Deployment&, std::int64_t soil, const std::string& state);
 
 } // namespace kuzure

@@ -11,8 +11,8 @@ namespace {
 class Replay {
 public:
     Replay(const Scene& s, const scene::Filling& f, const BlockSpace& space, int ranks, const std::vector<Vector>& end,
-           const std::vector<Vector>& way, double reach, double row_bytes)
-        : scene_(s), filling_(f), space_(space), grid_(space.grid(reach, row_bytes)), ranks_(ranks), end_(end), way_(way), x_(end.size()),
+           const std::vector<Vector>& way, double reach, double ghost_bytes)
+        : scene_(s), filling_(f), space_(space), grid_(space.grid(reach, ghost_bytes)), ranks_(ranks), end_(end), way_(way), x_(end.size()),
           known_(static_cast<std::size_t>(ranks)), holder_(end.size())
     {
         move(0);
@@ -122,9 +122,9 @@ private:
 
 std::vector<ReplayedCut> replay_repartition(const Scene& s, const scene::Filling& f, const BlockSpace& space, int ranks,
                                             const std::vector<Vector>& end, const std::vector<Vector>& way, int steps, double reach,
-                                            double row_bytes)
+                                            double ghost_bytes)
 {
-    Replay replay(s, f, space, ranks, end, way, reach, row_bytes);
+    Replay replay(s, f, space, ranks, end, way, reach, ghost_bytes);
     std::vector<ReplayedCut> cuts;
     for (int step = 1; step <= steps; ++step) cuts.push_back(replay.cut(double(step) / steps, step == steps));
     return cuts;

@@ -19,6 +19,6 @@ struct ReplayedCut {
 };
 /// `x`: the later state, m; `way`: how each particle came there from its start.
 std::vector<ReplayedCut> replay_repartition(const Scene&, const scene::Filling&, const BlockSpace&, int ranks, const std::vector<Vector>& x,
-                                            const std::vector<Vector>& way, int steps, double reach, double row_bytes);
+                                            const std::vector<Vector>& way, int steps, double reach, double ghost_bytes);
 
 } // namespace kuzure

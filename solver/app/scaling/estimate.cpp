@@ -69,7 +69,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     const bool mixed = model.precision() == scene::Precision::Mixed;
     e.mixed = mixed;
     e.support = k;
-    e.record = double(row_bytes(model));
+    e.record = double(ghost_bytes(model));
     const double records = double(model.record_bytes());
     const double skin = std::pow(1 + s.accuracy.skin, 3);
     const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();

@@ -21,13 +21,13 @@ namespace {
 // What the model assumes beside a machine's constants; each is explained in docs/performance.md.
 constexpr double rim_per_seen = 1.5;     // a cluster waits as a whole when one of its particles does
 constexpr double steps_per_rebuild = 17; // hirata_52: 579 rebuilds in 10,000 steps
-constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, places of ghosts
-constexpr double ghost_bytes = 40;       // of a ghost's place at a rebuild
+constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, sorted positions of ghosts
+constexpr double sorted_bytes = 40;      // of a ghost's sorted position, id and soil, at a rebuild
 constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
 // Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
 constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
 constexpr double even_iterations = 55;  // numbers told to all peers, each with a sum over all ranks
-constexpr double even_rounds = 11;      // of offers: offers, answers and news, and a sum and a maximum over all ranks
+constexpr double even_rounds = 11;      // of offers: offers, answers and updates, and a sum and a maximum over all ranks
 constexpr double even_moves = 0.105;    // particles that migrate, of a rank's
 constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which every rank gets
 constexpr double state_bytes = 252;     // of a particle that migrates
@@ -39,7 +39,7 @@ double imbalance_growth(double particles) { return 6.1e-5 * std::pow(35152 / std
 
 } // namespace
 
-StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
+StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
 {
     const auto& c = at.machine.cost;
     const double cores = double(at.machine.node.cores) / at.ranks_per_node;
@@ -48,21 +48,21 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
     const double memory = c.memory_bandwidth / at.ranks_per_node; // a rank's share
 
     StepSeconds s;
-    double slowest = 0, most_computed = 0, halo_of_slowest = 0, messages = 0, ghosts = 0, node_rows = 0;
+    double slowest = 0, most_computed = 0, halo_of_slowest = 0, messages = 0, ghosts = 0, node_ghosts = 0;
     for (const RankLoad& r : ranks) {
         const double pairs = r.pairs * pair, computed = pairs + r.particles * particle;
         s.pairs += pairs / double(ranks.size()), s.particles += r.particles * particle / double(ranks.size());
         const double interior = r.particles > 0 ? pairs * (1 - std::min(1.0, rim_per_seen * r.rim / r.particles)) : 0;
         // Packed and unpacked once each: read and written.
-        const double copies = 2 * (r.rows + r.ghosts) * at.row_bytes / memory;
+        const double copies = 2 * (r.sent + r.ghosts) * at.ghost_bytes / memory;
         const double near = r.messages - r.far_messages;
-        const double wire = (r.far_messages > 0 ? latency : 0) + r.node_rows * at.row_bytes / bandwidth +
-                            (near > 0 ? 2 * std::max(0.0, r.rows) * at.row_bytes / memory : 0);
+        const double wire = (r.far_messages > 0 ? latency : 0) + r.node_ghosts * at.ghost_bytes / bandwidth +
+                            (near > 0 ? 2 * std::max(0.0, r.sent) * at.ghost_bytes / memory : 0);
         // Half the latency of a message is the processor's own time, at both ends; within a node a fifth of it.
         const double handling = latency * (r.far_messages + 0.2 * near);
         const double halo = copies + handling + std::max(0.0, wire - interior);
         s.network = std::max(s.network, wire);
-        messages = std::max(messages, r.messages), ghosts = std::max(ghosts, r.ghosts), node_rows = std::max(node_rows, r.node_rows);
+        messages = std::max(messages, r.messages), ghosts = std::max(ghosts, r.ghosts), node_ghosts = std::max(node_ghosts, r.node_ghosts);
         most_computed = std::max(most_computed, computed);
         if (computed + halo > slowest) slowest = computed + halo, halo_of_slowest = halo;
     }
@@ -71,7 +71,7 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const StepPlace& at)
     if (at.ranks < 2) return s;
     const double levels = std::ceil(std::log2(double(at.ranks)));
     s.reduction = 2 * levels * latency;
-    s.rebuild = (rebuild_exchanges * (2 * messages + 2 * levels) * latency + (node_rows * ghost_bytes) / bandwidth +
+    s.rebuild = (rebuild_exchanges * (2 * messages + 2 * levels) * latency + (node_ghosts * sorted_bytes) / bandwidth +
                  double(at.ranks_per_node) * at.ranks * box_bytes / bandwidth) /
                 steps_per_rebuild;
     // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
@@ -103,7 +103,7 @@ std::vector<RankLoad> loads(const CutShare& cut, int ranks_per_node)
     const auto node = [&](int rank) { return std::size_t(rank / ranks_per_node); };
     for (const HaloMessage& m : cut.message) {
         if (node(m.from) == node(m.to)) continue;
-        out[node(m.from)] += double(m.rows), in[node(m.to)] += double(m.rows);
+        out[node(m.from)] += double(m.ghosts), in[node(m.to)] += double(m.ghosts);
         ++all[m.from].far_messages;
     }
     for (std::size_t r = 0; r < all.size(); ++r) {
@@ -112,11 +112,11 @@ std::vector<RankLoad> loads(const CutShare& cut, int ranks_per_node)
         all[r] = {.pairs = s.work.pairs(),
                   .particles = double(s.work.particles),
                   .rim = double(s.seen),
-                  .rows = double(s.rows),
+                  .sent = double(s.sent),
                   .ghosts = double(s.ghosts),
                   .messages = double(s.messages),
                   .far_messages = all[r].far_messages,
-                  .node_rows = std::max(out[n], in[n])};
+                  .node_ghosts = std::max(out[n], in[n])};
     }
     return all;
 }
@@ -130,12 +130,12 @@ double predict_seconds(const Estimate& e, const io::MachineProfile& m, int nodes
     RankLoad r{.pairs = e.pairs / double(e.steps) / ranks,
                .particles = n,
                .rim = std::min(n, ghosts),
-               .rows = ghosts,
+               .sent = ghosts,
                .ghosts = ghosts,
                .messages = std::min(26.0, ranks - 1)};
     r.far_messages = nodes > 1 ? r.messages : 0;
-    r.node_rows = nodes > 1 ? shell(n * ranks_per_node) : 0;
-    const StepPlace at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
+    r.node_ghosts = nodes > 1 ? shell(n * ranks_per_node) : 0;
+    const Deployment at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
     return double(e.steps) * predict_step(std::span(&r, 1), at).total();
 }
 

@@ -13,14 +13,14 @@ namespace kuzure {
 /// path, with this host's cores and memory where the profile leaves them to it. Throws BadInput.
 io::MachineProfile machine_named(const std::string& name_or_path);
 
-/// What one rank computes and sends in a step; rows are ghost particles.
+/// What one rank computes and sends in a step; sent, ghosts: particles.
 struct RankLoad {
     double pairs = 0, particles = 0; // pairs in units of soil pairs
     double rim = 0;                  // particles whose sums wait for ghosts
-    double rows = 0, ghosts = 0;     // sent, and arriving
+    double sent = 0, ghosts = 0;     // sent, and arriving
     double messages = 0;             // sent; as many arrive
     double far_messages = 0;         // of them to other nodes
-    double node_rows = 0;            // between this rank's node and others, the larger of both ways, of all its ranks
+    double node_ghosts = 0;          // between this rank's node and others, the larger of both ways, of all its ranks
 };
 
 /// Seconds of one step by the model of docs/performance.md; the slowest rank counts.
@@ -37,15 +37,15 @@ struct StepSeconds {
     double total() const { return pairs + particles + imbalance + halo + reduction + rebuild + recut; }
 };
 
-/// Where a step is done. Cores of a node are shared evenly by its ranks.
-struct StepPlace {
+/// Machine, ranks and nodes of a run. Cores of a node are shared evenly by its ranks.
+struct Deployment {
     const io::MachineProfile& machine;
     int ranks = 1, ranks_per_node = 1;
-    double row_bytes = 128, blocks = 0;
+    double ghost_bytes = 128, blocks = 0;
     bool mixed = false;
     double latency_times = 1, bandwidth_times = 1; // for questions of sensitivity
 };
-StepSeconds predict_step(std::span<const RankLoad>, const StepPlace&);
+StepSeconds predict_step(std::span<const RankLoad>, const Deployment&);
 /// The loads of a counted cut, its ranks on nodes in order.
 std::vector<RankLoad> loads(const CutShare&, int ranks_per_node);
 

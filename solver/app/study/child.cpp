@@ -21,8 +21,8 @@ void pass_on(int signal)
     for (const auto pid : child_pids)
         if (pid > 0) kill(pid_t(pid), SIGTERM);
 }
-/// The place of a child among those that get signals; that of none (0) is a free one, or null.
-volatile std::sig_atomic_t* place_of(pid_t pid)
+/// The slot of a child among those that get signals; that of none (0) is a free one, or null.
+volatile std::sig_atomic_t* slot_of(pid_t pid)
 {
     for (auto& p : child_pids)
         if (p == std::sig_atomic_t(pid)) return &p;
@@ -44,7 +44,7 @@ ChildResult run_child(const std::vector<std::string>& arguments, const io::Path&
 
 Child::Child(const std::vector<std::string>& arguments, const io::Path& log, bool gives_way)
 {
-    if (!place_of(0)) throw IoFailed(fmt::format("starting kuzure run failed: {} run already", most_children));
+    if (!slot_of(0)) throw IoFailed(fmt::format("starting kuzure run failed: {} run already", most_children));
     // The child starts MPI anew: what this process's MPI left in the environment is not for it.
     std::vector<std::string> kept;
     for (char** e = environ; *e; ++e) {
@@ -78,7 +78,7 @@ Child::Child(const std::vector<std::string>& arguments, const io::Path& log, boo
         _exit(127);
     }
     if (pid_ < 0) throw IoFailed(fmt::format("starting kuzure run failed: {}", io::cause(log, errno)));
-    *place_of(0) = std::sig_atomic_t(pid_);
+    *slot_of(0) = std::sig_atomic_t(pid_);
     if (stop_signal) send(SIGTERM); // it came before the child did
 }
 
@@ -102,7 +102,7 @@ std::optional<ChildResult> Child::ended(bool wait)
     pid_t got = 0;
     while ((got = wait4(pid_, &status, wait ? 0 : WNOHANG, &used)) < 0 && errno == EINTR) {}
     if (got == 0) return std::nullopt;
-    if (auto* place = place_of(pid_)) *place = 0;
+    if (auto* slot = slot_of(pid_)) *slot = 0;
     pid_ = -1;
     ChildResult r;
     r.exit_code = got < 0 ? 127 : WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

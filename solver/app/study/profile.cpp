@@ -25,7 +25,7 @@ std::optional<std::array<double, 2>> common_axis(const Scene& s)
 }
 
 /// Positions per window: the profile is smooth over a window, so this many show all of it.
-const int places_per_window = 8;
+const int samples_per_window = 8;
 
 } // namespace
 
@@ -40,7 +40,7 @@ double Profile::operator()(double x) const
 
 double Profile::runout(double grain) const
 {
-    // The outermost place where the curve falls through the height, from the outside in.
+    // The outermost point where the curve falls through the height, from the outside in.
     const auto crossing = [&](bool outwards) -> std::optional<double> {
         const auto n = std::ptrdiff_t(at.size());
         for (std::ptrdiff_t j = 0; j < n; ++j) {
@@ -75,7 +75,7 @@ Profile measure_profile(const Scene& s, const io::SoilSnapshot& soil, double win
     if (soil.position.empty()) return p;
     p.start_low = start.low.x - half, p.start_high = start.high.x + half;
 
-    // A particle is a square (2-D), an upright slab of its volume; its place along the spread is smeared over one spacing.
+    // A particle is a square (2-D), an upright slab of its volume; its position along the spread is smeared over one spacing.
     std::vector<double> along;
     double across = 1; // m, width of what is measured at right angles to the spread
     if (p.spread == Spread::Radial) {
@@ -94,7 +94,7 @@ Profile measure_profile(const Scene& s, const io::SoilSnapshot& soil, double win
         for (const Vector& x : soil.position) along.push_back(x.x);
     }
     std::sort(along.begin(), along.end());
-    // Volume up to a place: particles count from half a spacing before their centre to half a spacing behind, linearly.
+    // Volume up to a point: particles count from half a spacing before their centre to half a spacing behind, linearly.
     std::vector<double> sums(along.size() + 1, 0);
     for (std::size_t i = 0; i < along.size(); ++i) sums[i + 1] = sums[i] + along[i];
     const auto count_below = [&](double x) {
@@ -104,12 +104,12 @@ Profile measure_profile(const Scene& s, const io::SoilSnapshot& soil, double win
         return double(whole) + (n * (x + half) - (sums[touched] - sums[whole])) / dx;
     };
 
-    // Beside a wall, where the soil has not moved outwards, the window must not look behind it.
+    // Beside a wall, where the soil has not moved outwards, the window must not reach behind it.
     const bool radial = p.spread == Spread::Radial;
     const bool stays_low = radial || along.front() - half > p.start_low - 0.25 * window;
     const bool stays_high = !radial && along.back() + half < p.start_high + 0.25 * window;
     const double first = stays_low ? p.start_low : along.front() - window, last = stays_high ? p.start_high : along.back() + window;
-    const double apart = window / places_per_window;
+    const double apart = window / samples_per_window;
     const auto n = std::size_t(std::ceil((last - first) / apart)) + 1;
     const double volume = s.particle_volume();
     for (std::size_t k = 0; k < n; ++k) {

@@ -19,7 +19,7 @@ struct Profile {
     double start_low = 0, start_high = 0; // m, where the soil stood before it moved
     double top = 0;                       // m, greatest height
 
-    /// Height (m) at a place, linear between neighbours, 0 beyond.
+    /// Height (m) at a point, linear between neighbours, 0 beyond.
     double operator()(double x) const;
     /// How far (m) the soil that stands at least `grain` high has run beyond where it stood: the mean of the sides that moved.
     double runout(double grain) const;
@@ -27,7 +27,7 @@ struct Profile {
 /// `window` (m): the width over which heights are taken.
 Profile measure_profile(const Scene&, const io::SoilSnapshot&, double window);
 
-/// sqrt(sum (a - b)^2/sum b^2) over the places of b where either stands: P_d of two profiles.
+/// sqrt(sum (a - b)^2/sum b^2) over the points of b where either stands: P_d of two profiles.
 double profile_distance(const Profile& a, const Profile& b);
 
 /// For each row of the initial lattice (2-D): x left of which no particle moved more than `limit` (m); {x, z}.

@@ -118,10 +118,10 @@ private:
         const double left = work_done_ > 0 ? seconds_done_ / work_done_ * (work_left_ - p.predicted_work) / threads_ : 0;
         const std::string how =
             p.exit_code == 0 ? fmt::format("{:.1f} core-seconds", p.core_seconds) : fmt::format("exit {}: {}", p.exit_code, p.message);
-        const std::string rest = last         ? ""
-                                 : left < 100 ? fmt::format("; about {:.0f} s left", left)
-                                              : fmt::format("; about {:.1f} minutes left", left / 60);
-        say(head + ": " + how + rest);
+        const std::string still = last         ? ""
+                                  : left < 100 ? fmt::format("; about {:.0f} s left", left)
+                                               : fmt::format("; about {:.1f} minutes left", left / 60);
+        say(head + ": " + how + still);
     }
 
     void measure_all()

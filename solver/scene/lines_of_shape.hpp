@@ -1,5 +1,5 @@
 #pragma once
-// What a row along x meets of a shape: where it is all inside, all outside, and where single points must be asked.
+// What a line along x meets of a shape: where it is all inside, all outside, and where single points must be asked.
 #include "solver/scene/shape.hpp"
 #include <optional>
 #include <vector>
@@ -14,29 +14,29 @@ inline double slack(const Shape& shape, double spacing, int dimensions)
     return std::max(tolerance * spacing, rounding_of(shape, dimensions));
 }
 
-/// Part of a row along x.
+/// Part of a line along x.
 struct Zone {
     double from, to;
 };
 
-/// Depth (m) of a row along x below the faces that the row runs along: those of a box in y and z, the ends of
+/// Depth (m) of a line along x below the faces that the line runs along: those of a box in y and z, the ends of
 /// a cylinder, the sides of a polygon. Negative outside.
 double depth_between_faces(const Shape&, double y, double z, int dimensions);
 
-/// Where a row along x passes a round shape: the x of its centre, and the square of the row's distance from it.
+/// Where a line along x passes a round shape: the x of its centre, and the square of the line's distance from it.
 struct Passage {
     double centre, across2, radius;
 };
 std::optional<Passage> passage(const Shape&, double y, double z, int dimensions);
 
-/// At most so many distances from a point to a polygon's edge are taken to fill it: for each row that an edge passes a few points
-/// at the passage, more where it runs along the row, each against every edge.
+/// At most so many distances from a point to a polygon's edge are taken to fill it: for each line that an edge passes a few points
+/// at the passage, more where it runs along the line, each against every edge.
 double edge_tests(const Polygon&, double spacing);
 /// Points next to a polygon's edges are looked at one by one, each against all corners: more of that than this takes too long.
 inline constexpr double most_edge_tests = 1e9;
 
-/// The parts of a row along x that come nearer than margin to the surface, faces along the row not counted,
-/// from left to right. Between them a row is all inside or all outside.
+/// The parts of a line along x that come nearer than margin to the surface, faces along the line not counted,
+/// from left to right. Between them a line is all inside or all outside.
 std::vector<Zone> zones_near_surface(const Shape&, double y, double z, double margin, int dimensions);
 
 } // namespace kuzure::scene

@@ -1,4 +1,4 @@
-#include "solver/scene/rows_of_shape.hpp"
+#include "solver/scene/lines_of_shape.hpp"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -49,7 +49,7 @@ std::vector<Zone> zones_near_edges(const std::vector<std::array<double, 2>>& poi
         const auto &a = points[k], &b = points[(k + 1) % points.size()];
         const double ax = a[0], az = a[1], bx = b[0], bz = b[1]; // no bindings: clang 14 keeps them out of lambdas
         if (std::max(az, bz) < z - margin || std::min(az, bz) > z + margin) continue;
-        // The part of the edge within margin of the row's height.
+        // The part of the edge within margin of the line's height.
         const auto x_at = [&](double height) {
             return az == bz ? height < z ? ax : bx : ax + std::clamp((height - az) / (bz - az), 0.0, 1.0) * (bx - ax);
         };
