@@ -1,10 +1,10 @@
 #include "io/checkpoint.hpp"
 #include "io/hdf5.hpp"
+#include "io/json.hpp"
 #include <algorithm>
 #include <bit>
 #include <cstring>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure::io {
 namespace {
@@ -101,7 +101,7 @@ Manifest read_manifest(const H5Reader& in)
     Manifest m;
     m.text = text;
     try {
-        const json all = json::parse(text);
+        const json all = parse_json(text);
         if (all.at("format") != format_name) in.refuse("not a checkpoint of kuzure");
         if (all.at("version") != format_version)
             in.refuse(fmt::format("checkpoint format {}, this program reads format {}: use the version that wrote it",

@@ -1,4 +1,5 @@
 #include "io/owner.hpp"
+#include "io/json.hpp"
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
@@ -9,7 +10,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <thread>
@@ -77,7 +77,7 @@ std::string text_of(const Owner& o)
 std::optional<Owner> owner_from(const std::string& text)
 {
     try {
-        const auto j = ordered_json::parse(text);
+        const auto j = parse_json<ordered_json>(text);
         Owner o;
         o.host = j.at("host"), o.pid = j.at("pid"), o.started = j.at("started"), o.boot = j.at("boot");
         o.pid_namespace = j.at("pid_namespace"), o.job = j.at("job"), o.restarts = j.at("restarts");

@@ -1,9 +1,14 @@
 #include "io/time_record.hpp"
 #include "io/csv.hpp"
+#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 namespace kuzure::io {
+namespace {
+// As event.gravity and coordinates have it, and times as other keys have them.
+constexpr double largest = 1e6, latest = 1e9; // m/s^2 or m; s
+} // namespace
 
 std::vector<std::array<double, 4>> read_time_record(const Path& path, const RecordOf& record)
 {
@@ -26,6 +31,10 @@ std::vector<std::array<double, 4>> read_time_record(const Path& path, const Reco
             if (!x)
                 csv.refuse(line, fmt::format("expected a number in {} for {}, found \"{}\"; write it with a point, without a unit",
                                              c == 0 ? "s" : record.unit, names[c], cells[*at[c]]));
+            const double most = c == 0 ? latest : largest;
+            if (std::fabs(*x) > most)
+                csv.refuse(line, fmt::format("expected at most {:g} {} for {}, found {:g}; are these the units?", most,
+                                             c == 0 ? "s" : record.unit, names[c], *x));
             row[c] = *x;
         }
         if (rows.size() == 1 ? row[0] < 0 : !(row[0] > rows[rows.size() - 2][0]))

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# Fuzzing of the scene reader and the checkpoint reader with libFuzzer, ASan and UBSan (docs/verification.md). Needs clang, which
+# Fuzzing of the readers, tests/fuzz/NAME_fuzz.cpp, with libFuzzer, ASan and UBSan (docs/verification.md). Needs clang, which
 # jobs/install.sh does not install: apt-get install clang libclang-rt-dev
-#   tests/fuzz.sh scene|checkpoint EXECUTIONS   so many more; corpus and logs in build/fuzz/, which grow from run to run
-#   tests/fuzz.sh count                         executions of all runs so far, by their logs; those that go on count too
+#   tests/fuzz.sh NAME EXECUTIONS   so many more (scene, checkpoint ...); corpus and logs in build/fuzz/, which grow from run to run
+#   tests/fuzz.sh count             executions of all runs so far, by their logs; those that go on count too
 # A finding ends the run with 1 and lies in build/fuzz/findings; mend it and keep it as a seed in tests/fuzz/corpus.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 logs=build/fuzz/logs
+mapfile -t all < <(basename -a -s _fuzz.cpp tests/fuzz/*_fuzz.cpp)
 executions() { # by a log: what it says in the end, or had said when it was cut short
     local n
     n=$(grep -aoE '^#[0-9]+|^stat::number_of_executed_units: +[0-9]+' "$1" | tail -n 1 | grep -oE '[0-9]+$')
@@ -14,7 +15,7 @@ executions() { # by a log: what it says in the end, or had said when it was cut 
 }
 case ${1-} in
 count)
-    for what in scene checkpoint; do
+    for what in "${all[@]}"; do
         total=0
         for log in "$logs/$what".*; do
             [ -f "$log" ] || continue
@@ -26,18 +27,20 @@ count)
     done
     exit
     ;;
-scene) options=(-max_len=1600 -dict=tests/fuzz/scene.dict) ;;
+scene) options=(-max_len=1600) ;;
 checkpoint) options=(-max_len=12000) ;;
-*)
+*) options=(-max_len=4000) ;;
+esac
+if [ ! -f "tests/fuzz/${1-}_fuzz.cpp" ]; then
     sed -n '2,7s/^# \{0,1\}//p' "$0" >&2
     exit 2
-    ;;
-esac
+fi
 what=$1
+[ ! -f "tests/fuzz/$what.dict" ] || options+=("-dict=tests/fuzz/$what.dict")
 runs=${2:?how many executions}
 command -v clang++ >/dev/null || { echo "clang is missing: apt-get install clang libclang-rt-dev" >&2; exit 1; }
 mkdir -p build
-flock build/.fuzz-lock jobs/build.sh fuzz scene_fuzz checkpoint_fuzz # both may be started at once
+flock build/.fuzz-lock jobs/build.sh fuzz "${what}_fuzz" # several may be started at once
 mkdir -p build/fuzz/findings "$logs"
 # Goes on from the corpus that earlier runs have grown.
 grown=tests/fuzz/grown/$what.tar.xz

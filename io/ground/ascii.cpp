@@ -143,6 +143,15 @@ Raster read_ascii(const Path& path, const std::optional<Window>& window)
     const auto crs = crs_beside(path);
     const auto h = header(path, words, geographic(crs));
     const Part part = part_of(h.grid, window, path.string());
+    // Before memory is taken for numbers that a small file cannot hold: each has a digit and a blank.
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(path, error);
+    const double numbers = double(h.grid.columns) * h.grid.rows;
+    if (!error && numbers > 1e6 && double(bytes) < 2 * numbers - 1)
+        throw BadInput(
+            fmt::format("{}: {} rows of {} numbers were expected, its {} bytes do not hold them. Remedy: it is cut short, copy it "
+                        "again; or correct ncols and nrows",
+                        path.string(), h.grid.rows, h.grid.columns, bytes));
     Raster r{crop(h.grid, part), crs};
     if (part.empty()) return r;
     const double nodata = h.nodata.value_or(-9999);

@@ -1,9 +1,9 @@
 // GeoJSON: of WGS 84 as RFC 7946 has it, or of the system that an older file names in "crs".
 #include "io/ground/crs.hpp"
 #include "io/ground/features.hpp"
+#include "io/json.hpp"
 #if KUZURE_TERRAIN
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace kuzure::io::ground {
 namespace {
@@ -23,7 +23,7 @@ GeoJson geojson(const Path& path)
             fmt::format("{}: there is no such file. Remedy: correct the path; it counts from the scene file's directory", path.string()));
     json all;
     try {
-        all = json::parse(read_text(path, std::uint64_t(256) << 20));
+        all = parse_json(read_text(path, std::uint64_t(256) << 20));
     } catch (const json::exception& e) {
         throw BadInput(fmt::format("{}: cannot be read as GeoJSON: {}. Remedy: save the layer again", path.string(), e.what()));
     }

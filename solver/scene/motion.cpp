@@ -213,7 +213,8 @@ void check_move(const Scene& s, const Event& e, const std::string& key, Issues& 
         error(".velocity", fmt::format("expected no motion along y in two dimensions, found {:g} m/s; write 0.0", m.velocity.y));
     if (m.turn) {
         const Vector n = m.turn->axis;
-        if (n == Vector{}) error(".rotation.axis", "expected a direction, found [0, 0, 0]; about y: [0.0, 1.0, 0.0]");
+        if (!(length(n) > 1e-100)) // shorter ones have no length in double numbers
+            error(".rotation.axis", fmt::format("expected a direction, found [{:g}, {:g}, {:g}]; about y: [0.0, 1.0, 0.0]", n.x, n.y, n.z));
         else if (s.dimensions == 2 && (n.x != 0 || n.z != 0))
             error(".rotation.axis", "expected the axis y in two dimensions, found another; leave it out");
     }

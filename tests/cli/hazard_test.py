@@ -248,6 +248,31 @@ def main():
     call("run", scene("reversed"), "-o", "reversed-run", "--quiet")
     done = call("hazard", scene("other", uncertain=UNCERTAIN.replace("seed = 4", "seed = 5")), "-o", "two", *SIX, expect=2)
     check("other" in done.stderr and digest("two") == want, "another scene does not go on in the directory of this one")
+    # What stands in the files of an earlier answer, by whose hand ever.
+    for what, changes in (
+        ("a group that no memory holds", {"group": 10**12}),
+        ("a group in words", {"group": "many"}),
+        ("no spacing", {"preliminary_spacing": 0}),
+        ("layers in words", {"ensemble_layers": "six"}),
+        ("layers without end", {"finer_layers": [1e300]}),
+    ):
+        os.makedirs(os.path.join(work, "damaged"))
+        with open(os.path.join(work, "damaged", "plan.json"), "w") as f:
+            json.dump({**runs.json("two", "plan.json"), **changes}, f)
+        done = call("hazard", heap, "-o", "damaged", *SIX, expect=4)
+        check("plan.json: damaged" in done.stderr, f"plan.json with {what}: {done.stderr.strip()[:200]}")
+        check(os.listdir(os.path.join(work, "damaged")) == ["plan.json"], "and nothing is written")
+        shutil.rmtree(os.path.join(work, "damaged"))
+    deep = "[" * 300000
+    for what, text in (
+        ("runs elsewhere", json.dumps(two).replace("members/001", "../two/members/001")),
+        ("a number in words", json.dumps({**two, "group": "many"})),
+        ("a list that is none", json.dumps({**two, "members": 3})),
+        ("brackets without end", deep),
+    ):
+        with open(os.path.join(work, "forged.json"), "w") as f:
+            f.write(text)
+        refused("forged", "forged.json: expected a hazard.json", args=("--members-from", "forged.json"))
     os.makedirs(os.path.join(work, "mine"))
     open(os.path.join(work, "mine", "letter.txt"), "w").close()
     call("hazard", heap, "-o", "mine", *SIX, expect=2)

@@ -342,6 +342,10 @@ def refused():
                 event(span + 'move = { wall = "plate", rotation = { center = [0.0, 0.0, 0.0], axis = [1.0, 0.0, 0.0], rate = 1.0 } }'),
                 "the axis y",
             ),
+            "an axis without length": (
+                event(span + 'move = { wall = "plate", rotation = { center = [0.0, 0.0, 0.0], axis = [0.0, 1e-170, 0.0], rate = 1.0 } }'),
+                "expected a direction",
+            ),
             "no rate": (event(span + 'move = { wall = "plate", rotation = { center = [0.0, 0.0, 0.0] } }'), "rotation.rate"),
             "twice": (
                 tray(more=move("plate", (1.0, 0.0, 0.0), 0.1, 0.3) + move("plate", (2.0, 0.0, 0.0), 0.2, 0.4)),

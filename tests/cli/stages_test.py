@@ -196,6 +196,8 @@ def excavation():
 
 def other_ways():
     """The same stages by Bui's leap-frog, with soil that may sleep, with retry, in three dimensions with maps."""
+    if not os.path.exists(runs.path("one")):
+        run(scene("excavation", EXCAVATION + STAGES), "one")
     for name, more in (
         ("leap-frog", '[accuracy]\nscheme = "leap-frog"\ncfl = 0.2\n'),
         ("sleeping", "[accuracy]\ncfl = 0.5\nsleep_below = 0.002\n"),
@@ -385,6 +387,8 @@ def slope():
 def refused():
     event = lambda lines: DUG + "[[event]]\n" + lines  # noqa: E731
     two = lambda a, b: event(a) + "\n[[event]]\n" + b  # noqa: E731
+    runs.write("wild.csv", "time,x\n0,0\n0.1,1e300\n")
+    runs.write("late.csv", "time,x\n0,0\n1e300,1\n")
     wrong = {
         "unknown name": (event('at = 0.1\nremove = "gate"'), 'found "gate"'),
         "unknown soil": (event("at = 0.1\n[event.soil.caly]\ncohesion = 1.0"), 'did you mean "clay"'),
@@ -405,6 +409,8 @@ def refused():
         "no strength left": (event("at = 0.1\n[event.soil.clay]\ncohesion = 0.0\nfriction_angle = 0.0"), "a soil with strength"),
         "no water": (event("at = 0.1\nwater = [[0.0, 1.0]]"), "expected a scene with still water"),
         "no record": (event('at = 0.1\nshaking = "nothing.csv"'), "nothing.csv"),
+        "a record of other units": (event('at = 0.1\nshaking = "wild.csv"'), "wild.csv:3: expected at most 1e+06 m/s^2"),
+        "a record without end": (event('at = 0.1\nshaking = "late.csv"'), "late.csv:3: expected at most 1e+09 s"),
         "gravity along y": (event("at = 0.1\ngravity = [0.0, 1.0, -9.81]"), "no gravity along y"),
         "stress added": (event('at = 0.1\nadd = "base"'), "expected a body without stress"),
         "name twice": (DUG.replace('name = "left"', 'name = "floor"'), "no other wall, body or load has"),

@@ -507,6 +507,17 @@ def main():
         "outline_absent": ({}, [('"scar.geojson"', '"w.geojson"')], ["w.geojson: there is no such file"]),
         "outline_ending": ({"w.kml": "x"}, [('"scar.geojson"', '"w.kml"')], ["w.kml: expected a name ending in .shp"]),
         "outline_text": ({"w.geojson": "{ nothing"}, [('"scar.geojson"', '"w.geojson"')], ["w.geojson: cannot be read as GeoJSON"]),
+        # The library copies and writes JSON by calling itself: it would end the program.
+        "outline_deep": (
+            {"w.geojson": '{"type": "Feature", "properties": {"thickness": ' + "[" * 200000 + "]" * 200000 + '}, "geometry": null}'},
+            [('"scar.geojson"', '"w.geojson"')],
+            ["w.geojson: cannot be read as GeoJSON"],
+        ),
+        "dem_short": (
+            {"w.asc": "ncols 19000\nnrows 19000\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n"},
+            [("dem.asc", "w.asc")],
+            ["w.asc: 19000 rows of 19000 numbers were expected, its 75 bytes do not hold them"],
+        ),
         "outline_shp_alone": ({"w.shp": b"\0" * 200}, [('"scar.geojson"', '"w.shp"')], ["w.shp: its .shx is not beside it"]),
         "outline_open": (
             {"w.geojson": geojson([box(20, 50, 24, 30)[:-1]])},

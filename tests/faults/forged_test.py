@@ -135,6 +135,24 @@ def main():
                 )
                 check(not os.path.exists(place("out")), f"{what}: nothing is written")
 
+        # Events that have begun before their time: what has begun stays begun, and is not told again.
+        event = "[[event]]\nat = 0.0016\n"
+        events = f"\n{event}damping = 0.01\n{event}[event.soil.sand]\ncohesion = 900.0\n"
+        staged = place.write("staged.toml", scene_text(end=0.001) + events)
+        place.run(staged, "staged")
+        for begun in (1, 2):
+            bad = place("early.h5")
+            forge(place("staged/checkpoint.h5"), bad, clock(events=begun))
+            place.run(staged, f"early{begun}", f"--restart={bad}", "--set", "time.end=0.002")
+            with open(place(f"early{begun}/events.csv")) as f:
+                told = f.read().splitlines()[2:]
+            check(len(told) == 2 - begun, f"{begun} of two events begun too early: the others are told, once: {told}")
+        forge(place("staged/checkpoint.h5"), bad, clock(events=3))
+        done = place.run(staged, "early3", f"--restart={bad}", "--set", "time.end=0.002", expect=4)
+        check("events have begun" in done.stderr, f"more events than the scene has: {done.stderr.strip()[-200:]}")
+        forge(place("staged/checkpoint.h5"), bad, clock(version=5))
+        place.run(staged, "unnamed", f"--restart={bad}", "--set", "time.end=0.002")
+
         # Tables that lie elsewhere: external and soft links, raw data in another file.
         for what in ("external link", "soft link", "external link to a group", "raw data elsewhere"):
             bad = place("bad.h5")

@@ -5,15 +5,13 @@
 // Built for libFuzzer (-DKUZURE_FUZZ=ON), and for the replay of the corpus in the normal suite (replay_test.cpp).
 #include "io/checkpoint.hpp"
 #include "io/hdf5.hpp"
+#include "tests/fuzz/fuzz.hpp"
 #include <bit>
-#include <cstdio>
-#include <cstdlib>
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <map>
-#include <unistd.h>
 
 using namespace kuzure;
+using namespace kuzure::fuzz;
 
 // HDF5's own; hdf5.h is for io/ only. How much of what it gave back it may keep for the next use, -1 for all.
 extern "C" int H5set_free_list_limits(int, int, int, int, int, int);
@@ -23,30 +21,6 @@ extern "C" std::uint32_t H5_checksum_metadata(const void*, std::size_t, std::uin
 namespace {
 
 const SingleRank alone;
-
-[[noreturn]] void found(const char* what)
-{
-    std::fprintf(stderr, "checkpoint_fuzz: %s\n", what);
-    std::abort();
-}
-
-/// A directory in memory that goes with the program.
-struct Scratch {
-    io::Path path;
-    Scratch()
-    {
-        char shared[] = "/dev/shm/kuzure_fuzz_XXXXXX", plain[] = "/tmp/kuzure_fuzz_XXXXXX";
-        const char* made = mkdtemp(shared);
-        if (!made) made = mkdtemp(plain);
-        if (!made) found("no place for files");
-        path = made;
-    }
-    ~Scratch()
-    {
-        std::error_code ignored;
-        std::filesystem::remove_all(path, ignored);
-    }
-};
 
 Particles seven()
 {
@@ -59,14 +33,6 @@ Particles seven()
             for (Index i = 0; i < 7; ++i) p[f].column[c][i] = T(i + 10 * c);
     });
     return p;
-}
-
-void write(const io::Path& file, std::string_view bytes)
-{
-    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-    if (fd < 0 || ::write(fd, bytes.data(), bytes.size()) != ssize_t(bytes.size()) || ::ftruncate(fd, off_t(bytes.size())) != 0)
-        found("the scratch file cannot be written");
-    ::close(fd);
 }
 
 std::uint64_t mix(std::uint64_t h)

@@ -12,19 +12,6 @@ constexpr double least_ratio = 1.15; // of two spacings whose answers are compar
 
 } // namespace
 
-const char* word(Part p)
-{
-    return p == Part::Preliminary ? "preliminary" : p == Part::Likely ? "likely" : p == Part::Member ? "member" : "finer";
-}
-const char* word(Status s)
-{
-    return s == Status::NotRun     ? "not run"
-           : s == Status::Finished ? "finished"
-           : s == Status::Failed   ? "numbers failed"
-           : s == Status::Refused  ? "refused"
-                                   : "stopped";
-}
-
 namespace {
 
 /// The error of resolution, from the likely values at several of them.

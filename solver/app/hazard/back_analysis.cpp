@@ -3,6 +3,7 @@
 #include "io/ground/raster.hpp"
 #include "io/map_picture.hpp"
 #include "io/owner.hpp"
+#include "solver/app/hazard/kept.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/study/runs.hpp"
 #include "solver/core/wall_clock.hpp"
@@ -15,8 +16,6 @@
 
 namespace kuzure::hazard {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr const char* mark = "fit_plan.json";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -123,28 +122,28 @@ private:
     {
         std::error_code error;
         if (!std::filesystem::exists(out_ / mark, error)) {
-            plan_ = {{"of", identity()}};
+            plan_ = {identity(), {}};
             return;
         }
         try {
-            plan_ = Json::parse(io::read_text(out_ / mark));
-            if (plan_.at("of") != identity())
-                throw BadInput(
-                    fmt::format("{}: expected the directory of this search, found one with another scene, event or range. Remedy: "
-                                "choose another with -o DIR",
-                                out_.string()));
-            if (!plan_.contains("spacing")) return;
-            const double was = plan_.at("spacing");
-            if (layers_.given && was != spacing_)
-                throw BadInput(
-                    fmt::format("--layers: the runs in {} have {:.3g} layers. Remedy: leave --layers out, or choose another -o DIR",
-                                out_.string(), base_.layers_of(was)));
-            spacing_ = was;
-        } catch (const Json::exception& e) {
+            plan_ = fit_from_text(io::read_text(out_ / mark));
+        } catch (const IoFailed&) {
+            throw;
+        } catch (const std::runtime_error& e) {
             throw IoFailed(fmt::format("{}: damaged ({}). Remedy: choose another directory with -o DIR", (out_ / mark).string(), e.what()));
         }
+        if (plan_.of != identity())
+            throw BadInput(fmt::format("{}: expected the directory of this search, found one with another scene, event or range. Remedy: "
+                                       "choose another with -o DIR",
+                                       out_.string()));
+        if (!plan_.spacing) return;
+        const double was = *plan_.spacing;
+        if (layers_.given && was != spacing_)
+            throw BadInput(fmt::format("--layers: the runs in {} have {:.3g} layers. Remedy: leave --layers out, or choose another -o DIR",
+                                       out_.string(), base_.layers_of(was)));
+        spacing_ = was;
     }
-    void keep_plan() { io::write_atomically(out_ / mark, plan_.dump(1) + "\n"); }
+    void keep_plan() { io::write_atomically(out_ / mark, to_text(plan_)); }
 
     // ---- what is run
 
@@ -165,7 +164,7 @@ private:
     /// With a deadline: as many layers as fit by what one coarse run takes, at most the scene's own.
     void choose_layers()
     {
-        if (plan_.contains("spacing")) return;
+        if (plan_.spacing) return;
         const double own = base_.scene.space.spacing;
         const double coarse = coarse_spacing();
         base_.coarsest = coarse;
@@ -189,7 +188,7 @@ private:
         const auto maps = maps_of_runs(base_);
         cell_ = maps.cell, wet_ = maps.wet;
         of_cells_ = misfit_of_cells(observed_, cell_);
-        plan_["spacing"] = spacing_;
+        plan_.spacing = spacing_;
         keep_plan();
         std::vector<std::string> ranges;
         for (const auto& a : axes_) ranges.push_back(fmt::format("{} from {:g} to {:g}{}", a.name, a.low, a.high, unit_of(a)));
@@ -399,7 +398,7 @@ private:
     int cores_ = 1, jobs_ = 1;
     double spacing_ = 0, cell_ = 0, wet_ = 0, of_cells_ = 0, of_repeats_ = nan;
     bool repeats_wanted_ = false;
-    Json plan_;
+    KeptFit plan_;
     std::vector<Tried> tried_, repeats_;
     std::optional<Queue> queue_;
     std::optional<io::Ownership> owner_;

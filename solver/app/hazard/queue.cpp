@@ -1,11 +1,11 @@
 #include "solver/app/hazard/queue.hpp"
 #include "io/quote.hpp"
+#include "solver/app/hazard/kept.hpp"
 #include "solver/core/wall_clock.hpp"
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
 #include <list>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 namespace kuzure::hazard {
@@ -68,13 +68,9 @@ void Queue::take_what_is_there(Run& r) const
     if (!std::filesystem::is_directory(where, error)) return;
     study::wait_for_the_end_of_a_run(where);
     try {
-        const auto j = nlohmann::json::parse(io::read_text(where / "summary.json"));
-        if (j.at("status") == "finished") {
-            r.seconds = j.value("wall_seconds", 0.0);
-            finish(r);
-        } else if (j.at("status") == "numbers failed") {
-            r.status = Status::Failed, r.message = j.value("message", std::string());
-        }
+        const auto end = end_from_text(io::read_text(where / "summary.json"));
+        if (end && end->status == Status::Finished) r.seconds = end->seconds, finish(r);
+        else if (end) r.status = end->status, r.message = end->message;
     } catch (const std::exception&) { // not ended, or not whole: it is run again
         r.status = Status::NotRun;
     }

@@ -1,5 +1,6 @@
 #include "solver/app/hazard/runner.hpp"
 #include "io/owner.hpp"
+#include "solver/app/hazard/kept.hpp"
 #include "solver/app/hazard/page.hpp"
 #include "solver/app/hazard/plan.hpp"
 #include "solver/app/hazard/queue.hpp"
@@ -13,8 +14,6 @@
 
 namespace kuzure::hazard {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr double start_seconds = 1.0; // s, at most, of a run before its first step: reading, forecast
 
@@ -114,17 +113,19 @@ private:
         std::error_code error;
         if (std::filesystem::exists(out_ / "plan.json", error)) {
             try {
-                plan_ = Json::parse(io::read_text(out_ / "plan.json"));
-                preliminary_spacing_ = plan_.at("preliminary_spacing"), group_ = plan_.at("group");
-                if (plan_.at("of") != identity())
-                    throw BadInput(fmt::format("{}: expected the directory of this scene, found one whose runs have other physics or other "
-                                               "[uncertain]. Remedy: choose another with -o DIR",
-                                               out_.string()));
-            } catch (const Json::exception& e) {
+                plan_ = plan_from_text(io::read_text(out_ / "plan.json"));
+            } catch (const IoFailed&) {
+                throw;
+            } catch (const std::runtime_error& e) {
                 throw IoFailed(
                     fmt::format("{}: damaged ({}). Remedy: choose another directory with -o DIR", (out_ / "plan.json").string(), e.what()));
             }
-            const double was = plan_.value("ensemble_layers", 0.0);
+            preliminary_spacing_ = plan_.preliminary_spacing, group_ = plan_.group;
+            if (plan_.of != identity())
+                throw BadInput(fmt::format("{}: expected the directory of this scene, found one whose runs have other physics or other "
+                                           "[uncertain]. Remedy: choose another with -o DIR",
+                                           out_.string()));
+            const double was = plan_.ensemble_layers.value_or(0);
             if (layers_.given && was > 0 && std::fabs(was - layers_.ensemble) > 1e-9)
                 throw BadInput(
                     fmt::format("--layers: the members in {} have {:g} layers. Remedy: leave --layers out, or choose another -o DIR",
@@ -133,11 +134,11 @@ private:
             const double own = base_.layers_of(base_.scene.space.spacing);
             const double wanted = layers_.preliminary > 0 ? layers_.preliminary : std::min(preliminary_layers, std::max(own, 1.0));
             preliminary_spacing_ = fixed_spacing_ ? base_.scene.space.spacing : possible_spacing(base_, base_.spacing_of(wanted));
-            plan_ = {{"of", identity()}, {"preliminary_spacing", preliminary_spacing_}, {"group", 0}};
+            plan_ = {identity(), preliminary_spacing_, 0, {}, {}};
         }
         base_.coarsest = preliminary_spacing_;
     }
-    void keep_plan() { io::write_atomically(out_ / "plan.json", plan_.dump(1) + "\n"); }
+    void keep_plan() { io::write_atomically(out_ / "plan.json", to_text(plan_)); }
 
     void open()
     {
@@ -161,13 +162,13 @@ private:
         // Members side by side share what one run has alone: what happens before the first step, too.
         Cost shared = cost_;
         shared.start /= std::min(jobs_, cores_);
-        double layers = plan_.value("ensemble_layers", layers_.ensemble);
+        double layers = plan_.ensemble_layers.value_or(layers_.ensemble);
         if (fixed_spacing_) layers = base_.layers_of(base_.scene.space.spacing);
         const int asked = args_.members > 0 ? args_.members : base_.uncertain.members;
         Plan p = make_plan(shared, left(), asked, layers);
         if (group_ == 0) group_ = asked > 0 ? asked : p.members;
         if (asked == 0) p.members = group_;
-        plan_["group"] = group_, plan_["ensemble_layers"] = p.layers;
+        plan_.group = group_, plan_.ensemble_layers = p.layers;
         keep_plan();
         return p;
     }
@@ -182,7 +183,7 @@ private:
         const Plan p = plan_ensemble();
         add_ensemble(p);
         if (layers_.finer > 0 && !fixed_spacing_) {
-            plan_["finer_layers"] = {layers_.finer};
+            plan_.finer_layers = {layers_.finer};
             add_finer(possible_spacing(base_, base_.spacing_of(layers_.finer)));
         }
         keep_plan();
@@ -248,10 +249,10 @@ private:
             return not_finer(
                 {"the scene starts from the state of another run, whose spacing is given", "初期状態の粒子間隔が決まっているため"});
         if (layers_.given && layers_.finer == 0) return not_finer({"--layers asks for none", "--layers の指定により"});
-        const auto before = std::ranges::count_if(queue_->runs, [](const Run& r) { return r.part == Part::Finer; });
+        const auto before = std::size_t(std::ranges::count_if(queue_->runs, [](const Run& r) { return r.part == Part::Finer; }));
         if (layers_.given && before > 0) return false;
-        auto& kept = plan_["finer_layers"]; // an earlier call's, perhaps with a checkpoint
-        double layers = kept.is_array() && kept.size() > std::size_t(before) ? kept[std::size_t(before)].get<double>() : 0;
+        auto& kept = plan_.finer_layers; // an earlier call's, perhaps with a checkpoint
+        double layers = kept.size() > before ? kept[before] : 0;
         if (layers == 0) {
             layers = layers_.given ? layers_.finer : finer_layers(cost_, left(), finest());
             if (layers == 0)
@@ -261,8 +262,7 @@ private:
         const double spacing = possible_spacing(base_, base_.spacing_of(layers));
         if (!(base_.layers_of(spacing) > 1.05 * finest()))
             return not_finer({"the bodies hold no finer whole spacings that fit", "物体の寸法に合う細かい間隔がないため"});
-        if (!kept.is_array()) kept = Json::array();
-        if (kept.size() <= std::size_t(before)) kept.push_back(layers);
+        if (kept.size() <= before) kept.push_back(layers);
         keep_plan();
         auto& r = add_finer(spacing);
         const double expected = cost_.seconds(r.layers);
@@ -377,7 +377,7 @@ private:
     int cores_ = 1, jobs_ = 1, group_ = 0, extra_from_ = 0;
     double preliminary_spacing_ = 0, reserve_ = 0, publish_seconds_ = 0, published_at_ = 0;
     Cost cost_;
-    Json plan_;
+    KeptPlan plan_;
     Words finer_not_done_;
     std::optional<Queue> queue_;
     std::vector<Run> published_; // what the last answer points at

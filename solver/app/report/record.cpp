@@ -1,4 +1,5 @@
 #include "solver/app/report/record.hpp"
+#include "io/json.hpp"
 #include "io/picture_series.hpp"
 #include "io/scene_file.hpp"
 #include <algorithm>
@@ -49,23 +50,6 @@ namespace {
 
 constexpr std::uint64_t MiB = std::uint64_t(1) << 20;
 
-/// Parsed JSON, or a discarded value for what is none or lies deeper than a run writes: the library goes down by calling itself.
-nlohmann::json parse_json(const std::string& text)
-{
-    int depth = 0, deepest = 0;
-    bool inside = false;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        const char c = text[i];
-        if (inside) {
-            if (c == '\\') ++i;
-            else inside = c != '"';
-        } else if (c == '"') inside = true;
-        else if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
-        else if (c == ']' || c == '}') --depth;
-    }
-    return deepest <= 64 ? nlohmann::json::parse(text, nullptr, false) : nlohmann::json(nlohmann::json::value_t::discarded);
-}
-
 } // namespace
 
 double Record::number(const char* key) const
@@ -111,7 +95,7 @@ public:
     nlohmann::json object(const char* name, const char* meaning)
     {
         const std::string t = text(name, meaning);
-        auto j = parse_json(t);
+        auto j = io::parse_json(t, false);
         if (j.is_object()) return j;
         if (!t.empty()) gaps_.push_back(fmt::format("{} is damaged: {}.", name, meaning));
         return nlohmann::json::object();
@@ -188,7 +172,7 @@ void find_pictures(Record& r, Reader& from)
     // Pictures carry the number of their snapshot, whose time the series tells.
     std::map<std::string, double> times;
     if (from.there("snapshots/state.hdf.series")) {
-        const auto series = parse_json(from.text("snapshots/state.hdf.series", "times of pictures are unknown"));
+        const auto series = io::parse_json(from.text("snapshots/state.hdf.series", "times of pictures are unknown"), false);
         if (series.is_object() && series.contains("files") && series["files"].is_array())
             for (const auto& file : series["files"])
                 if (file.is_object() && file.contains("name") && file["name"].is_string() && file.contains("time") &&

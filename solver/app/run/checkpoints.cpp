@@ -1,10 +1,10 @@
 #include "solver/app/run/checkpoints.hpp"
+#include "io/json.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/cli/command.hpp"
 #include "solver/app/run/clock_text.hpp"
 #include "solver/core/ensure.hpp"
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure {
 
@@ -18,8 +18,9 @@ std::optional<io::Checkpoint> checkpoint_at(const Comm& comm, const io::Path& pa
 
 std::string other_writer(const io::Checkpoint& from)
 {
-    const auto header = nlohmann::json::parse(from.header, nullptr, false);
-    const std::string writer = header.is_object() ? header.value("version", std::string("an unnamed program")) : "an unnamed program";
+    const auto header = io::parse_json(from.header, false);
+    const bool named = header.is_object() && header.contains("version") && header["version"].is_string();
+    const std::string writer = named ? header["version"].get<std::string>() : "an unnamed program";
     return writer == version_text() ? "" : writer;
 }
 
@@ -66,7 +67,7 @@ void require_room_for(const Comm& comm, const io::Checkpoint& from, const io::Pa
 
 double peak_speed_of(const io::Checkpoint& from)
 {
-    const auto j = nlohmann::json::parse(from.header, nullptr, false);
+    const auto j = io::parse_json(from.header, false);
     return j.is_object() && j.contains("peak_speed") && j["peak_speed"].is_number() ? j["peak_speed"].get<double>() : 0;
 }
 

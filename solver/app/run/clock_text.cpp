@@ -1,7 +1,7 @@
 #include "solver/app/run/clock_text.hpp"
+#include "io/json.hpp"
 #include "solver/app/cli/command.hpp"
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure {
 
@@ -52,7 +52,7 @@ std::string clock_text(const Simulation& sim)
 Clock clock_from_text(const std::string& header, const io::Place& file)
 {
     try {
-        const auto j = nlohmann::json::parse(header);
+        const auto j = io::parse_json(header);
         Clock c;
         j.at("time").get_to(c.time), j.at("step").get_to(c.step), j.at("dt").get_to(c.dt), j.at("pairs").get_to(c.pairs);
         std::size_t k = 0;

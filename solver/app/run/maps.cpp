@@ -1,6 +1,7 @@
 #include "solver/app/run/maps.hpp"
 #include "io/ground/crs.hpp"
 #include "io/ground/raster.hpp"
+#include "io/json.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/ground.hpp"
 #include "solver/scene/height_field.hpp"
@@ -151,7 +152,7 @@ KeptMaps maps_of(const Comm& comm, const io::Checkpoint& from, const Scene& scen
     };
     const std::string again = "go on without [maps], or run from the start with --force";
     const auto rows = io::read_checkpoint_table(comm, from, table_name, int(MapRow{}.size()));
-    const auto header = nlohmann::json::parse(from.header, nullptr, false);
+    const auto header = io::parse_json(from.header, false);
     if (!rows || !header.is_object() || !header.contains("maps")) refuse("one written without them", again);
     KeptMaps kept;
     scene::MapGrid was;

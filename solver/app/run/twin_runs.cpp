@@ -1,8 +1,8 @@
 #include "solver/app/run/twin_runs.hpp"
+#include "io/json.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/check.hpp"
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure {
 
@@ -14,7 +14,7 @@ std::string earlier_status(const study::TwinRun& t)
 {
     std::error_code ignored;
     if (std::filesystem::exists(t.directory / "summary.json", ignored)) {
-        const auto j = nlohmann::json::parse(io::read_text(t.directory / "summary.json"), nullptr, false);
+        const auto j = io::parse_json(io::read_text(t.directory / "summary.json"), false);
         if (j.is_object() && j.contains("status") && j["status"].is_string() && j.contains("scene_hash") &&
             j["scene_hash"] == io::scene_hash(t.twin.scene))
             return j["status"];

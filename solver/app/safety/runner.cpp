@@ -2,6 +2,7 @@
 #include "io/owner.hpp"
 #include "io/picture_series.hpp"
 #include "solver/app/report/pictures.hpp"
+#include "solver/app/safety/kept.hpp"
 #include "solver/app/safety/search.hpp"
 #include "solver/app/study/child.hpp"
 #include "solver/app/study/runs.hpp"
@@ -16,7 +17,6 @@
 namespace kuzure::safety {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using study::say, study::seconds_text;
 
 /// Thrown where this program was asked to stop.
@@ -91,8 +91,10 @@ private:
         std::error_code error;
         if (!std::filesystem::exists(out_ / "plan.json", error)) return;
         try {
-            if (Json::parse(io::read_text(out_ / "plan.json")).at("of") == identity_) return;
-        } catch (const Json::exception& e) {
+            if (identity_from_text(io::read_text(out_ / "plan.json")) == identity_) return;
+        } catch (const IoFailed&) {
+            throw;
+        } catch (const std::runtime_error& e) {
             throw BadInput(
                 fmt::format("{}: expected the plan of a factor of safety, found other text ({}). Remedy: choose another directory "
                             "with -o DIR",
@@ -107,7 +109,7 @@ private:
     {
         study::make_directories(out_, {"scenes", "runs", "logs", "trials"});
         owner_.emplace(io::hold(out_), complain);
-        io::write_atomically(out_ / "plan.json", Json{{"of", identity_}}.dump(1) + "\n");
+        io::write_atomically(out_ / "plan.json", plan_text(identity_));
         io::write_atomically(out_ / "scene.toml", io::read_scene_text(args_.scene.file));
     }
 
@@ -191,24 +193,17 @@ private:
     void recall(Trial& t) const
     {
         try {
-            const auto j = Json::parse(io::read_text(record_of(t.name)));
-            for (const auto& leg : j.at("legs"))
-                t.seen.push_back({leg.at("time"), leg.at("displacement"), leg.at("creep"), leg.at("unbalanced")});
-            t.seconds = j.at("seconds");
-        } catch (const std::exception&) { // none, or not whole
-            t.seen.clear();
+            auto kept = trial_from_text(io::read_text(record_of(t.name)));
+            t.seen = std::move(kept.seen), t.seconds = kept.seconds;
+        } catch (const std::runtime_error&) { // none, or not whole
         }
-        if (t.seen.size() > legs) t.seen.clear();
         t.outcome = judge(setting_, t.seen);
         // Inspections of a run of which no state is left are no help for what is still to be run.
         if (t.outcome != Outcome::Open && t.name != "settled") return;
         if (!study::has_checkpoint(run_of(t.name))) t.seen.clear(), t.outcome = Outcome::Open;
         begin_anew_without_checkpoint(t.name);
     }
-    void keep(const Trial& t) const
-    {
-        io::write_atomically(record_of(t.name), Json{{"factor", t.factor}, {"legs", legs_of(t)}, {"seconds", t.seconds}}.dump(1) + "\n");
-    }
+    void keep(const Trial& t) const { io::write_atomically(record_of(t.name), to_text(KeptTrial{t.factor, t.seen, t.seconds})); }
 
     Running begin_leg(int step)
     {

@@ -48,8 +48,6 @@ struct Told {
 };
 /// What of the scene bears on how the factor is to be read.
 std::vector<std::string> notes_of(const Scene&);
-/// The inspections of a trial, as its record and safety.json have them.
-nlohmann::ordered_json legs_of(const Trial&);
 nlohmann::ordered_json to_json(const Told&);
 std::string to_csv(const Told&);
 /// The page.

@@ -1,4 +1,5 @@
 // What is told of a factor of safety: safety.json, safety.csv, notes.
+#include "solver/app/safety/kept.hpp"
 #include "solver/app/safety/runner.hpp"
 #include "solver/scene/material.hpp"
 #include <algorithm>
@@ -37,14 +38,6 @@ std::vector<std::string> notes_of(const Scene& s)
     return notes;
 }
 
-Json legs_of(const Trial& t)
-{
-    Json legs = Json::array();
-    for (const auto& s : t.seen)
-        legs.push_back({{"time", s.time}, {"displacement", s.displacement}, {"creep", s.creep}, {"unbalanced", s.unbalanced}});
-    return legs;
-}
-
 Json to_json(const Told& t)
 {
     const auto number = [](const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); };
@@ -65,7 +58,7 @@ Json to_json(const Told& t)
                                {"displacement", trial.seen.back().displacement},
                                {"unbalanced", trial.seen.back().unbalanced},
                                {"seconds", trial.seconds},
-                               {"legs", legs_of(trial)}});
+                               {"legs", legs_of(trial.seen)}});
     }
     return j;
 }

@@ -1,4 +1,5 @@
 #include "solver/app/study/runner.hpp"
+#include "io/json.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/study/child.hpp"
 #include "solver/app/study/runs.hpp"
@@ -7,7 +8,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 namespace kuzure::study {
@@ -20,7 +20,7 @@ using Json = nlohmann::ordered_json;
 bool take_what_is_there(const io::Path& folder, Point& p)
 {
     try {
-        const auto j = Json::parse(io::read_text(folder / "point.json"));
+        const auto j = io::parse_json<Json>(io::read_text(folder / "point.json"));
         if (j.at("scene_hash") != p.hash || j.at("end") != p.scene->time.end || j.at("exit_code") != 0) return false;
         p.core_seconds = j.at("core_seconds");
     } catch (const std::exception&) {

@@ -1,4 +1,5 @@
 #include "solver/app/study/study.hpp"
+#include "io/json.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/report/record.hpp"
 #include "solver/app/scaling/estimate.hpp"
@@ -7,7 +8,6 @@
 #include <charconv>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure::study {
 namespace {
@@ -171,7 +171,7 @@ Study plan(const io::Sweep& sweep)
 
 void measure(const Study& study, Point& p, const io::Path& run)
 {
-    const auto summary = nlohmann::json::parse(io::read_text(run / "summary.json"));
+    const auto summary = io::parse_json(io::read_text(run / "summary.json"));
     p.particles = summary.at("soil_particles"), p.steps = summary.at("steps");
     p.pairs = summary.at("pairs").get<double>(), p.wall_seconds = summary.at("wall_seconds");
     p.work = p.pairs * step_price(p.scene->accuracy.scheme);

@@ -1,4 +1,5 @@
 #include "solver/app/study/twins.hpp"
+#include "io/json.hpp"
 #include "solver/app/study/convergence.hpp"
 #include "solver/app/study/profile.hpp"
 #include "solver/scene/check.hpp"
@@ -7,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 namespace kuzure::study {
 namespace {
@@ -136,7 +136,7 @@ nlohmann::ordered_json error_bars(const Scene& scene, const io::Path& directory,
     for (const auto& t : twins) {
         Json row{{"factor", t.twin.factor}};
         if (t.failed.empty()) {
-            const auto summary = nlohmann::json::parse(io::read_text(t.directory / "summary.json"));
+            const auto summary = io::parse_json(io::read_text(t.directory / "summary.json"));
             add(t.twin.scene, t.directory, summary.at("peak_speed"));
             row.update(Json{{"spacing", t.twin.scene.space.spacing},
                             {"directory", t.directory.lexically_relative(directory).string()},
