@@ -33,8 +33,8 @@ bool any_plate(const Scene&);
 void join_plates(const Team&, const Scene&, std::span<const Material>, Particles&);
 /// Collective. After the forces of a step: the soil under each plate is accelerated along its normal as one, by the forces on all of it.
 /// The plate gives and takes nothing, since its soil has one velocity along the normal; what is known already of the works of the half step
-/// to come (`later`) was booked for soil without it, and the difference goes to the account of loads. Largest speeds and ways join the
-/// maxima.
+/// to come (`later`) was booked for soil without it, and the difference goes to the account of loads.
+/// Largest speeds and ways join the maxima.
 void hold_plates(const Team&, const Scene&, std::span<const Material>, const StepInput&, PassResult&);
 
 /// What a load pushes: its particles, and their force together as it began, N, of all of it (factor 1).

@@ -65,9 +65,8 @@ void check_loads(const Scene& s, Issues& issues)
                       "write normal = [0.0, 0.0, 1.0]");
         if (l.normal && *l.normal == Vector{}) error(".normal", "expected a direction, found [0, 0, 0]; upward: [0.0, 0.0, 1.0]");
         if (l.follow && (l.traction || l.normal))
-            error(".follow",
-                  "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; "
-                  "leave one out");
+            error(".follow", "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; "
+                             "leave one out");
         if (l.plate && !l.normal)
             error(".plate",
                   "expected a normal with a plate, along which it moves, found none; for a level one write normal = [0.0, 0.0, 1.0]");
