@@ -231,7 +231,7 @@ std::string in_words(const Scene& s, const Event& e)
         if (m.ramp > 0) how += fmt::format(", coming to that and to rest in {:.6g} s each", m.ramp);
         parts.push_back(fmt::format("wall {} moves{}", m.wall, how));
     }
-    if (e.load) parts.push_back(fmt::format("{:.6g} of load {} acts", e.load->factor, e.load->name));
+    if (e.load) parts.push_back(fmt::format("load {} with a factor of {:.6g}", e.load->name, e.load->factor));
     if (e.damping) parts.push_back(*e.damping > 0 ? fmt::format("damping {:.6g} of critical", *e.damping) : std::string("no damping"));
     return fmt::format("{}", fmt::join(parts, "; "));
 }

@@ -45,7 +45,7 @@ std::string in_words(const Scene& s, int load)
     if (l.box) text += " in " + vector(l.box->low) + " to " + vector(l.box->high) + " m";
     if (l.follow) text += ", as they are at each time";
     if (l.plate) text += ", under a plate";
-    if (l.factor != 1) text += fmt::format(", {:.6g} of it", l.factor);
+    if (l.factor != 1) text += fmt::format(", with a factor of {:.6g}", l.factor);
     return text;
 }
 
