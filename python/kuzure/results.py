@@ -159,7 +159,7 @@ class Run:
         return self.table("history")
 
     def table(self, name):
-        """One of the tables of numbers: "history", "progress", or "front" of a run with maps."""
+        """One of the tables: "history", "progress", "forces", "probes", "events", or "front" of a run with maps."""
         return tables.frame(tables.read_table(self.directory / f"{name}.csv"))
 
     @property

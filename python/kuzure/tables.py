@@ -1,4 +1,5 @@
-"""Tables that grow while a run goes on: a line of names, a line of units, rows of numbers."""
+"""Tables that grow while a run goes on: a line of names, a line of units, rows of numbers, and of words in columns without a unit."""
+import csv
 from pathlib import Path
 
 import numpy
@@ -44,16 +45,17 @@ def read_table(file):
     names, units = lines[0].split(","), lines[1][1:].strip().split(",")
     if len(units) != len(names):
         raise DamagedFile(f"{file}:2: expected {len(names)} units, one a column, found {len(units)}")
+    words = [not unit.strip() for unit in units]
     rows = []
     for number, line in enumerate(lines[2 : -1 if torn else None], 3):
+        cells = next(csv.reader([line]), [])
         try:
-            rows.append([float(cell) for cell in line.split(",")])
+            rows.append([cell if word else float(cell) for cell, word in zip(cells, words)])
         except ValueError:
             raise DamagedFile(f"{file}:{number}: expected numbers, found {line[:80]!r}") from None
-        if len(rows[-1]) != len(names):
-            raise DamagedFile(f"{file}:{number}: expected {len(names)} numbers, found {len(rows[-1])}")
-    values = numpy.array(rows, dtype=float).reshape(len(rows), len(names))
-    columns = {name: values[:, k] for k, name in enumerate(names)}
+        if len(cells) != len(names):
+            raise DamagedFile(f"{file}:{number}: expected {len(names)} cells, found {len(cells)}")
+    columns = {name: numpy.array([row[k] for row in rows], dtype=str if words[k] else float) for k, name in enumerate(names)}
     if "step" in columns:
         columns["step"] = columns["step"].astype(numpy.int64)
     return Table(columns, dict(zip(names, units)))

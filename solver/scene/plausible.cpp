@@ -53,6 +53,13 @@ void check_soil(const Scene& scene, const Soil& soil, Rules& rules)
                            scene.space.spacing));
 }
 
+/// Something other than gravity moves the soil: a load, a wall that moves, gravity or shaking that comes later.
+bool pushed(const Scene& scene)
+{
+    const auto moves = [](const Event& e) { return e.move || e.shaking.rows || (e.gravity && length(*e.gravity) > 0); };
+    return !scene.loads.empty() || std::any_of(scene.events.begin(), scene.events.end(), moves);
+}
+
 void check_forces(const Scene& scene, Rules& rules)
 {
     const Effects& effects = scene.effects;
@@ -63,7 +70,7 @@ void check_forces(const Scene& scene, Rules& rules)
             rules.warning("effects.gravity", text("{:.4g} m/s^2 is more than any centrifuge reaches: it is in m/s^2", length(*g)));
         if (scene.walls.empty() && !(scene.space.periodic[2] && g->z != 0))
             rules.warning("wall", "there is gravity and no wall: all soil falls without end; write a [[wall]] below it");
-    } else if (all_rest) {
+    } else if (all_rest && !pushed(scene)) {
         rules.warning("effects.gravity", "there is no gravity and every body rests: nothing will move; write gravity = [0.0, 0.0, -9.81]");
     }
     if (const auto& water = effects.pore_pressure; water && (water->density < 500 || water->density > 3000))

@@ -45,6 +45,41 @@ def wedge(run):
     return wall, np.degrees(np.arctan2(3.0, 6.0 - start[sand, 0].min()))
 
 
+def pushed(run, wall, begin, end):
+    """Mean force on a named wall along x, N/m."""
+    forces = run.table("forces")
+    of_wall = forces["wall"] == wall
+    time, impulse = np.asarray(forces["time"])[of_wall], np.asarray(forces["impulse_x"])[of_wall]
+    a, b = (int(abs(time - t).argmin()) for t in (begin, end))
+    return (impulse[b] - impulse[a]) / (time[b] - time[a])
+
+
+def earth_pressure(run, begin, end):
+    """K: the force on the plate over rho g H^2/2."""
+    return -pushed(run, "plate", begin, end) / (1600 * 9.81 / 2)
+
+
+def front(run, t):
+    history = run.history
+    return float(np.interp(t, history["time"], history["front_max_x"]))
+
+
+def furthest(run, t):
+    return float(np.linalg.norm(run.snapshot(t)["displacement"], axis=1).max())
+
+
+def surface(run, t, low, high):
+    """The top of the soil between these x, m."""
+    x, _, z = run.snapshot(t)["position"].T
+    return float(z[(x > low) & (x < high)].max())
+
+
+def sinks(run, begin, end):
+    """Speed of the footing's plate, m/s."""
+    plate = run.table("probes")
+    return float(-np.subtract(*np.interp((end, begin), plate["time"], plate["z"])) / (end - begin))
+
+
 # What each must show, with the bounds within which it does.
 OUTCOMES = {
     "bank": lambda r: [("the front, m", r.history["front_max_x"].max(), 5.5, 7.0)],
@@ -71,6 +106,35 @@ OUTCOMES = {
         ("its top sinks, m", 3.9 - r.snapshot()["position"][soil(r, 0), 2].max(), 0.5, 3.5),
         ("the ground heaves, m", r.snapshot()["position"][soil(r, 1), 2].max(), 0.2, 2.0),
     ],
+    "gate": lambda r: [
+        ("the front while the gate is down, m", front(r, 0.2), 0.99, 1.01),
+        ("the gate bears, N/m", pushed(r, "gate", 0.0, 0.2), 3400, 4000),
+        ("the front at the end, m", front(r, 2.0), 2.2, 2.7),
+        ("speed at the end, m/s", r.history["max_speed"].iloc[-1], 0.0, 0.3),
+    ],
+    "excavation": lambda r: [
+        *[
+            (f"{lifts} lifts: the wall bears, kN/m", 1e-3 * pushed(r, "wall", *when), *bounds)
+            for lifts, when, bounds in (
+                (0, (0.5, 1.0), (65, 80)),
+                (1, (2.0, 2.5), (185, 205)),
+                (2, (3.5, 4.0), (270, 300)),
+                (3, (5.5, 6.0), (370, 415)),
+            )
+        ],
+        ("two lifts: the bottom heaves, m", surface(r, 4.0, 9.6, 15.0) - 4.9, 0.0, 0.03),
+        ("three: it heaves, m", surface(r, 6.0, 9.6, 15.0) - 3.5, 0.1, 0.3),
+        ("the ground behind sinks, m", 7.9 - surface(r, 6.0, 4.0, 7.0), 0.05, 0.3),
+    ],
+    "rain": lambda r: [
+        ("before the rain it moves, m", furthest(r, 3.0), 0.0, 0.005),
+        ("the slide's way, m", furthest(r, 12.0), 2.5, 5.0),
+        ("speed at the end, m/s", r.history["max_speed"].iloc[-1], 0.0, 0.2),
+    ],
+    # the last third of the motion
+    "active_wall": lambda r: [("K", earth_pressure(r, 1.2, 1.7), 0.34, 0.385)],
+    "passive_wall": lambda r: [("K", earth_pressure(r, 1.8, 2.6), 2.75, 3.2)],
+    "footing": lambda r: [("sinks at 4.8 c, m/s", sinks(r, 5.0, 6.0), 0, 0.002), ("at 5.7 c, m/s", sinks(r, 7.0, 8.5), 0.02, 0.06)],
     "hirata_52": lambda r: [("height over the edge", r.history["height"].iloc[-1] / 2.08, 0.3, 0.7)],
 }
 

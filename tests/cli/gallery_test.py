@@ -46,7 +46,7 @@ def unexplained(name, text, warnings):
 def main():
     work = Path(scratch("gallery"))
     files = {f.stem: f.read_text() for f in sorted(SCENES.glob("*.toml"))}
-    need(len(files) >= 13, f"{len(files)} scenes")
+    need(len(files) >= 23, f"{len(files)} scenes")
     check(sorted(kuzure.examples()) == sorted(files), "kuzure example lists every scene of jobs/scenes")
     listed = subprocess.run([program, "example"], capture_output=True, text=True).stdout
     check(all(re.search(rf"^  {n} +\S", listed, re.M) for n in files), "for people too")
@@ -63,7 +63,7 @@ def main():
         need(not unexplained(name, text, warnings), f"{name}: warnings that nothing explains: {unexplained(name, text, warnings)}")
         need(re.search(rf"^## {name}$|`{name}`", page, re.M), f"docs/gallery.md does not name {name}")
     figures = re.findall(r"!\[[^\]]+\]\((figures/gallery_\w+\.png)\)", page)
-    check(len(figures) >= 12, f"{len(figures)} pictures in docs/gallery.md")
+    check(len(figures) >= 19, f"{len(figures)} pictures in docs/gallery.md")
     for figure in figures:
         file = PAGE.parent / figure
         need(file.exists() and 4000 < file.stat().st_size < 60000, f"{figure}: missing, empty or 60 kB and more")
@@ -86,13 +86,12 @@ def main():
             sets["effects.damping.until"] = 0.5 * end
         run = kuzure.run(SCENES / f"{name}.toml", work / name, threads=1, **sets)
         s = run.summary
+        # what is left out of a tenth of the time
+        said = [w for w in s["warnings"] if not re.match(r"event\.\d+: it comes at .* the run ends", w)]
         moved = abs(run.snapshot()["displacement"]).max()
-        good = (
-            s["exit_code"] == 0 and abs(s["energy"]["residual"]) < 0.01 and 0 < moved < 100 and not unexplained(name, text, s["warnings"])
-        )
+        good = s["exit_code"] == 0 and abs(s["energy"]["residual"]) < 0.01 and 0 < moved < 100 and not unexplained(name, text, said)
         check(
-            good,
-            f"{name}: {s['steps']} steps of {s['soil_particles']}, moved {moved:.3g} m, residual {s['energy']['residual']:.1e} {s['warnings']}",
+            good, f"{name}: {s['steps']} steps of {s['soil_particles']}, moved {moved:.3g} m, residual {s['energy']['residual']:.1e} {said}"
         )
     finish()
 

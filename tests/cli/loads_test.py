@@ -117,7 +117,8 @@ def all_round():
         float_ = lambda parts: text(
             parts, end=0.3, dimensions=dimensions, effects="damping = { ratio = 1.0, until = 9.0 }\n", time="step = 1.0e-4"
         ).replace("spacing = 0.1", "spacing = 0.1\nh = 1.5")
-        run(scene("block", float_([block, load(f"pressure = {p}", more=follow)])), "block", extra=["--force"])
+        done = run(scene("block", float_([block, load(f"pressure = {p}", more=follow)])), "block", extra=["--force"])
+        check("nothing will move" not in done.stderr, f"{dimensions}-D: no word that nothing will move without gravity")
         measured = force("block")
         check(math.dist(measured, (0, 0, 0)) < 1e-9 * p, f"{dimensions}-D: no net force: {measured}")
         rows = table("block", "history.csv")

@@ -178,7 +178,7 @@ def work():
     ).replace('stress = "at rest"', "")
     plate = without(without(plate, "floor"), "back")
     plate = plate.replace("high = [0.0, 0.0, 1.6]", "high = [0.0, 0.0, 2.0]").replace("[-0.4, 0.0, 0.0]", "[-0.4, 0.0, -1.0]")
-    run(scene("hit", plate), "hit")
+    check("nothing will move" not in run(scene("hit", plate), "hit").stderr, "no word that nothing will move without gravity")
     rows, forces = table("hit", "history.csv"), table("hit", "forces.csv")
     worst = 0
     for r, f in zip(rows[1:], forces[1:]):

@@ -72,6 +72,13 @@ def runs():
     front = run.front()
     check(list(front["max_x"]) == list(table["front_max_x"]) and "min_y" in front, "front()")
     check(len(run.table("progress")["balance"]) > 0, "table('progress')")
+    rows = 'time,wall,force_x\n# s,,N/m\n0,"gate, the left",1.5\n0,7,nan\n'
+    (work / "a/forces.csv").write_text(rows)
+    forces = run.table("forces")
+    check(list(forces["wall"]) == ["gate, the left", "7"] and forces["force_x"][0] == 1.5, "columns without a unit are words")
+    (work / "a/forces.csv").write_text(rows.replace("1.5", "gate"))
+    refused(kuzure.DamagedFile, ["forces.csv", ":3:"], lambda: run.table("forces"))
+    (work / "a/forces.csv").unlink()
 
     times = run.snapshots.times
     check(len(run.snapshots) == 3 and times[0] == 0 and abs(times[-1] - 0.1) < 1e-12, f"snapshots at {times}")
