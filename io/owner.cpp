@@ -146,9 +146,8 @@ Life life_of(const Found& f, const Place& directory)
 
 [[noreturn]] void refuse(const Place& directory, const Found& f, bool certain)
 {
-    std::string words = fmt::format("{}: another run writes into this directory: {}. Wait for its end, stop it, or choose another "
-                                    "directory with -o",
-                                    directory.string(), f.owner ? f.owner->words() : "it does not say who it is");
+    std::string words = fmt::format("{}: {}: {}. Wait for its end, stop it, or choose another directory with -o", directory.string(),
+                                    Ownership::refusal, f.owner ? f.owner->words() : "it does not say who it is");
     if (!certain)
         words += fmt::format(". If that process is no more, remove {} and start again", (directory / Ownership::file_name).string());
     throw BadInput(words);

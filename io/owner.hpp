@@ -23,6 +23,8 @@ struct Owner {
 class Ownership {
 public:
     static constexpr const char* file_name = "kuzure.lock";
+    /// What the refusal of a directory that another run writes into says.
+    static constexpr const char* refusal = "another run writes into this directory";
     static constexpr int beat_seconds = 10, dead_after_seconds = 120;
 
     /// Takes a directory that no process owns, or whose owner is dead. A process of the same machine is known by its number and start; one

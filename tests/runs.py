@@ -37,6 +37,14 @@ def check_shell(script, what):
         check(done.returncode == 0, f"{what}: shellcheck {done.stdout}")
 
 
+def has_child(pid):
+    try:
+        with open(f"/proc/{pid}/task/{pid}/children") as f:
+            return bool(f.read().strip())
+    except OSError:
+        return True  # it has ended, or this system does not tell
+
+
 class Runs:
     """Scenes and result directories in one directory, by name."""
 
@@ -73,12 +81,14 @@ class Runs:
         return done
 
     def kill(self, args, times, least, most, seed, signals=(signal.SIGKILL,)):
-        """Starts the program so often, and sends it these signals in turn after a random time from `least` to `most` seconds; gives the
-        exit codes."""
+        """Starts the program so often, and sends it these signals in turn: after a random time from `least` to `most` seconds, or every
+        other time as soon as it has started a run of its own, which then outlives it for a moment. Gives the exit codes."""
         moments, codes = random.Random(seed), []
         for k in range(times):
             half = subprocess.Popen([program, *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.work)
-            time.sleep(moments.uniform(least, most))
+            end = time.monotonic() + moments.uniform(least, most)
+            while time.monotonic() < end and not (k % 2 and has_child(half.pid)):
+                time.sleep(0.002)
             half.send_signal(signals[k % len(signals)])
             codes.append(half.wait())
         return codes

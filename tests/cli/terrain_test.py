@@ -514,9 +514,9 @@ def main():
             ["w.geojson: cannot be read as GeoJSON"],
         ),
         "dem_short": (
-            {"w.asc": "ncols 19000\nnrows 19000\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n"},
+            {"w.asc": "ncols 19000\nnrows 19000\nxllcorner -9000\nyllcorner -19000\ncellsize 1\n1 2 3\n"},
             [("dem.asc", "w.asc")],
-            ["w.asc: 19000 rows of 19000 numbers were expected, its 75 bytes do not hold them"],
+            ["w.asc: 19000 rows of 19000 numbers were expected, its 74 bytes do not hold them"],
         ),
         "outline_shp_alone": ({"w.shp": b"\0" * 200}, [('"scar.geojson"', '"w.shp"')], ["w.shp: its .shx is not beside it"]),
         "outline_open": (

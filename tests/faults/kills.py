@@ -1,14 +1,20 @@
-"""kill -9 at random moments, resumed by --restart until the run ends: it must end with the bits of the undisturbed run."""
+"""Kills at random moments, by SIGKILL or SIGTERM, with a second starter beside the run; resumed by --restart until the run ends: one owner
+at any moment, and in the end the bits of the undisturbed run."""
 import os
 import random
 import re
 import signal
+import subprocess
 import time
 
 from faults import Place, check, kill, same_results, scene_text, wait_for
 
 # What is killed. "machine" is all processes at once, as when a node goes down under them.
 VICTIMS = ("one rank", "mpirun", "machine", "program without mpirun")
+SIGNALS = ("SIGKILL", "SIGTERM")
+# How the second is started, as by a hand or a batch system that does not know of the first, and what may become of it.
+AGAIN = ((), ("--force",), ("--restart",))
+SECOND = ("refused: the first writes there", "refused: results are there", "took over", "killed too")
 
 
 def campaign(kills, seed, kills_a_run=5):
@@ -18,10 +24,13 @@ def campaign(kills, seed, kills_a_run=5):
         "seed": seed,
         "kills": 0,
         "by_victim": {v: 0 for v in VICTIMS},
+        "by_signal": {s: 0 for s in SIGNALS},
         "during_a_checkpoint_write": 0,
         "between_two_renames": 0,
         "before_the_first_checkpoint": 0,
-        "second_starters": {"refused": 0, "took over": 0, "killed too": 0},
+        "second_starters": {s: 0 for s in SECOND},
+        "second_starters_ended_beside_a_living_run": 0,
+        "second_starters_that_came_first": 0,
         "runs": 0,
         "runs_with_the_bits_of_the_undisturbed_one": 0,
         "resumed_from_previous": 0,
@@ -67,41 +76,55 @@ def kill_once(place, scene, out, rng, record):
             60,
         )
         time.sleep(rng.uniform(0, 0.6))
-        if rng.random() < 0.5:
-            wait_for(lambda: process.poll() is not None or os.path.exists(temporary), 5, every=0.0002)
-    # A second starter beside it, as by a hand that does not know of the first: refused while the first lives, its heir once it is dead.
-    second = None
-    if rng.random() < 0.5:
-        second = place.start(scene, out, rng.choice(("--restart", "--force")), said=out + ".second")
-        time.sleep(rng.uniform(0, 0.6))
-    everyone = [(pid, is_rank) for pid, is_rank in place.processes(out) if not second or pid != second.pid]
+    # A second starter beside it: refused while the first lives, its heir once it is dead.
+    second = place.start(scene, out, *rng.choice(AGAIN), said=out + ".second")
+    time.sleep(rng.uniform(0, rng.choice((0.15, 1.0))))
+    if had and rng.random() < 0.5:
+        wait_for(lambda: process.poll() is not None or os.path.exists(temporary), 5, every=0.0002)
+    early, alive = second.poll(), process.poll() is None
+    if early is not None and alive:
+        record["second_starters_ended_beside_a_living_run"] += 1
+        check(early == 2, f"{out}: beside a living run the second starter ends with {early}, expected 2")
+    everyone = [(pid, is_rank) for pid, is_rank in place.processes(out) if pid != second.pid]
     chosen = [pid for pid, is_rank in everyone if is_rank or victim in ("mpirun", "machine")]
     if victim == "mpirun":
         chosen = [pid for pid, is_rank in everyone if not is_rank] or chosen
     if victim == "one rank" and chosen:
         chosen = [rng.choice(chosen)]
-    hit = [pid for pid in chosen if process.poll() is None and kill(pid, signal.SIGKILL)]
+    number = rng.choice(SIGNALS)
+    hit = [pid for pid in chosen if process.poll() is None and kill(pid, getattr(signal, number))]
     try:
-        process.wait(30)
-    except Exception:
+        process.wait(60)
+    except subprocess.TimeoutExpired:
         process.kill()
-        check(False, f"{out}: mpirun did not end within 30 s of the kill of {victim}")
-    if second:
-        if victim == "machine" and second.poll() is None:
-            kill(second.pid, signal.SIGKILL)
-        code = second.wait(120)
-        with open(place(out + ".second")) as f:
-            words = f.read()
-        kind = {2: "refused", 0: "took over", -signal.SIGKILL: "killed too"}.get(code)
-        if check(kind is not None, f"{out}: the second starter ends with {code}: {words[-300:]}"):
-            record["second_starters"][kind] += 1
-        check(code != 2 or "another run" in words, f"{out}: the second starter is told of the first: {words.strip()[-200:]}")
+        check(False, f"{out}: it did not end within 60 s of {number} to {victim}")
+    # What lies there tells where the kill fell.
+    writing = os.path.exists(temporary)
+    newest, previous = os.path.exists(place(out, "checkpoint.h5")), os.path.exists(place(out, "checkpoint.prev.h5"))
+    lies = {
+        "during_a_checkpoint_write": writing,
+        "between_two_renames": writing and previous and not newest,
+        "before_the_first_checkpoint": not newest and not previous,
+    }
+    if victim == "machine" and second.poll() is None:
+        kill(second.pid, signal.SIGKILL)
+    code = second.wait(300)
+    with open(place(out + ".second")) as f:
+        words = f.read()
+    kind = {0: "took over", -signal.SIGKILL: "killed too"}.get(code)
+    if code == 2:
+        kind = SECOND[0] if "writes into this directory" in words else SECOND[1] if "--restart" in words else None
+    if check(kind is not None, f"{out}: the second starter ends with {code}: {words.strip()[-300:]}"):
+        record["second_starters"][kind] += 1
     place.gone(out)
     with open(place(out + ".said")) as f:
         said = f.read()
     if had:
         check("no checkpoint in" not in said, f"{out}: with a checkpoint there it is never started from the beginning")
     record["resumed_from_previous"] += len(re.findall("Going back to", said))
+    if process.returncode == 2 and "writes into this directory" in said:
+        record["second_starters_that_came_first"] += 1
+        return False
     if not hit or process.returncode == 0:
         check(
             process.returncode == 0 or bool(hit), f"{out}: ends by itself only when it is finished, exit {process.returncode} {said[-300:]}"
@@ -109,13 +132,9 @@ def kill_once(place, scene, out, rng, record):
         return False
     record["kills"] += 1
     record["by_victim"][victim] += 1
-    # What lies there tells where the kill fell.
-    if os.path.exists(temporary):
-        record["during_a_checkpoint_write"] += 1
-        if not os.path.exists(place(out, "checkpoint.h5")) and os.path.exists(place(out, "checkpoint.prev.h5")):
-            record["between_two_renames"] += 1
-    if not os.path.exists(place(out, "checkpoint.h5")) and not os.path.exists(place(out, "checkpoint.prev.h5")):
-        record["before_the_first_checkpoint"] += 1
+    record["by_signal"][number] += 1
+    for what, so in lies.items():
+        record[what] += so
     return True
 
 

@@ -4,6 +4,7 @@
 #include "io/map_picture.hpp"
 #include "io/named_points.hpp"
 #include "solver/app/hazard/run_scene.hpp"
+#include "solver/app/study/runs.hpp"
 #include "solver/scene/map_grid.hpp"
 #include <nlohmann/json_fwd.hpp>
 
@@ -39,6 +40,7 @@ struct Run {
     io::Path directory;             // below that of the hazard
     Status status = Status::NotRun;
     std::string message;                 // why it failed
+    int waits = study::most_waits;       // left, for a run of an earlier call in the same place
     double seconds = 0;                  // wall time, of all its starts in this call
     std::vector<std::string> notes;      // what had to be changed in its scene
     std::shared_ptr<const RunMaps> maps; // of a finished one

@@ -112,6 +112,7 @@ void Queue::work(std::vector<Run*> todo, int jobs, int threads, double expected)
             }
             at->run->seconds += wall_clock() - at->began;
             conclude(*at->run, *ended);
+            if (at->run->status == Status::NotRun) todo.push_back(at->run);
             if (at->run->finished()) sum += at->run->seconds, ++measured;
             at = running.erase(at);
             after_each_();
@@ -160,6 +161,10 @@ void Queue::conclude(Run& r, const study::ChildResult& ended) const
         }
         break;
     case 2:
+        if (study::waited_for_an_earlier_run(ended.exit_code, log, out_ / r.directory, r.waits)) {
+            r.status = Status::NotRun;
+            return;
+        }
         r.status = Status::Refused, r.message = study::last_words(log);
         break;
     case 5:

@@ -172,7 +172,10 @@ private:
         prepare("state", *state_);
         begin_anew_without_checkpoint("state");
         say(fmt::format("the scene's own run to t = {:g} s", *args_.at));
-        const auto ended = study::Child(command("state", *args_.at, cores_), log_of("state"), true).ended(true);
+        int waits = study::most_waits;
+        std::optional<study::ChildResult> ended;
+        do ended = study::Child(command("state", *args_.at, cores_), log_of("state"), true).ended(true);
+        while (study::waited_for_an_earlier_run(ended->exit_code, log_of("state"), run_of("state"), waits));
         require_ended("state", *ended);
     }
 
@@ -215,6 +218,7 @@ private:
     void end_leg(const Running& r, const study::ChildResult& ended)
     {
         Trial& t = trial(r.step);
+        if (study::waited_for_an_earlier_run(ended.exit_code, log_of(t.name), run_of(t.name), t.waits)) return; // the leg is run again
         require_ended(t.name, ended);
         const int leg = int(t.seen.size());
         t.seen.push_back(inspect(setting_, run_of(t.name), leg > 0 ? end_of_leg(setting_, leg - 1) : 0, end_of_leg(setting_, leg)));

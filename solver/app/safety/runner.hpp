@@ -3,6 +3,7 @@
 // finished is not run again.
 #include "solver/app/cli/command.hpp"
 #include "solver/app/safety/trial.hpp"
+#include "solver/app/study/runs.hpp"
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 
@@ -25,7 +26,8 @@ struct Trial {
     std::string name; // of its scene, log and directory
     std::vector<Seen> seen;
     Outcome outcome = Outcome::Open;
-    double seconds = 0; // of its runs
+    double seconds = 0;            // of its runs
+    int waits = study::most_waits; // left, for a run of an earlier call in the same place
 };
 
 /// What was found: between which factors the soil fails.

@@ -1,5 +1,6 @@
 #include "solver/app/study/runner.hpp"
 #include "io/json.hpp"
+#include "io/owner.hpp"
 #include "io/scene_file.hpp"
 #include "solver/app/study/child.hpp"
 #include "solver/app/study/runs.hpp"
@@ -72,6 +73,7 @@ private:
                 "{}: expected a new directory or that of a study, found one with other things in it; choose another with -o DIR",
                 out_.string()));
         std::filesystem::create_directories(out_ / "points", error);
+        owner_.emplace(io::hold(out_), complain);
         io::write_atomically(out_ / "sweep.toml", text);
     }
 
@@ -150,12 +152,17 @@ private:
     {
         const io::Path here = folder(p);
         std::error_code error;
-        std::filesystem::remove_all(here, error);
-        std::filesystem::create_directories(here, error);
-        io::write_atomically(here / "scene.toml", io::write_scene(*p.scene));
-        const auto child = run_child(
-            {"run", (here / "scene.toml").string(), "-o", (here / "run").string(), "--threads", std::to_string(threads), "--quiet"},
-            here / "log.txt");
+        ChildResult child;
+        int waits = most_waits;
+        do {
+            wait_for_the_end_of_a_run(here / "run");
+            std::filesystem::remove_all(here, error);
+            std::filesystem::create_directories(here, error);
+            io::write_atomically(here / "scene.toml", io::write_scene(*p.scene));
+            child = run_child(
+                {"run", (here / "scene.toml").string(), "-o", (here / "run").string(), "--threads", std::to_string(threads), "--quiet"},
+                here / "log.txt");
+        } while (!child.stopped && waited_for_an_earlier_run(child.exit_code, here / "log.txt", here / "run", waits));
         if (child.stopped) return false;
         p.exit_code = child.exit_code, p.core_seconds = child.core_seconds;
         // Only the results count: a checkpoint of each of many points would fill the disk.
@@ -175,6 +182,7 @@ private:
     const Comm& comm_;
     StudyArguments args_;
     io::Path out_;
+    std::optional<io::Ownership> owner_;
     Study study_;
     int threads_ = 1;
     double work_left_ = 0, work_done_ = 0, seconds_done_ = 0; // of the points to run: pairs, core-seconds

@@ -1,5 +1,6 @@
 #include "solver/app/study/runs.hpp"
 #include "io/owner.hpp"
+#include "solver/app/cli/command.hpp"
 #include <chrono>
 #include <cstdio>
 #include <fmt/format.h>
@@ -64,6 +65,14 @@ void wait_for_the_end_of_a_run(const io::Path& directory)
             std::this_thread::sleep_for(std::chrono::milliseconds(200));
         }
     }
+}
+
+bool waited_for_an_earlier_run(int exit_code, const io::Path& log, const io::Path& directory, int& times)
+{
+    if (exit_code != int(Exit::BadInput) || times <= 0 || last_words(log).find(io::Ownership::refusal) == std::string::npos) return false;
+    --times;
+    wait_for_the_end_of_a_run(directory);
+    return true;
 }
 
 bool has_checkpoint(const io::Path& directory)

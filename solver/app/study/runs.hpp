@@ -24,6 +24,10 @@ void require_own_directory(const io::Path& out, const char* mark, const char* wh
 /// A run whose starter was killed is asked to stop and still writes for a moment: waits until none lives in this result directory, at most
 /// 20 s.
 void wait_for_the_end_of_a_run(const io::Path& directory);
+/// True, `times` times, of a child that was refused because such a run had not ended, or not even begun to write, when it was looked for:
+/// waits for its end, and the child is to be started again.
+bool waited_for_an_earlier_run(int exit_code, const io::Path& log, const io::Path& directory, int& times);
+inline constexpr int most_waits = 3;
 /// Whether a result directory holds a checkpoint.
 bool has_checkpoint(const io::Path& directory);
 
