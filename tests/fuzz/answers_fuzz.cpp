@@ -10,7 +10,7 @@ using namespace kuzure::fuzz;
 
 namespace {
 
-void look_at(const hazard::KeptRuns& kept)
+void inspect(const hazard::KeptRuns& kept)
 {
     if (!(kept.coarsest > 0) || kept.group < 0) found("an answer of no runs");
     for (const auto& r : kept.runs) {
@@ -20,7 +20,7 @@ void look_at(const hazard::KeptRuns& kept)
     }
 }
 
-void look_at(const safety::KeptTrial& t)
+void inspect(const safety::KeptTrial& t)
 {
     if (t.seen.size() > safety::legs) found("more looks than legs");
     for (const auto& s : t.seen)
@@ -47,14 +47,14 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
             break;
         }
         case 2:
-            look_at(hazard::runs_from_text(rest, {"friction"}));
+            inspect(hazard::runs_from_text(rest, {"friction"}));
             break;
         case 3:
             if (const auto end = hazard::end_from_text(rest); end && !(end->seconds >= 0)) found("a run of no time");
             break;
         case 4: {
             const auto trial = safety::trial_from_text(rest);
-            look_at(trial);
+            inspect(trial);
             if (to_text(safety::trial_from_text(to_text(trial))) != to_text(trial)) found("a trial reads back as another");
             break;
         }

@@ -12,7 +12,7 @@ using namespace kuzure::fuzz;
 
 namespace {
 
-void look_at(const io::Outlines& o)
+void inspect(const io::Outlines& o)
 {
     if (o.features.empty()) found("outlines of nothing");
     for (const auto& f : o.features) {
@@ -26,12 +26,12 @@ void look_at(const io::Outlines& o)
         if (std::isnan(io::area(f.rings))) found("an area that is no number");
     }
 }
-void look_at(const io::NamedPoints& all)
+void inspect(const io::NamedPoints& all)
 {
     for (const auto& p : all.points)
         if (p.name.empty() || !std::isfinite(p.x) || !std::isfinite(p.y)) found("a point without a name or a place");
 }
-void look_at(const io::Raster& r)
+void inspect(const io::Raster& r)
 {
     if (r.grid.values.size() != std::size_t(r.grid.columns) * std::size_t(r.grid.rows)) found("a raster of another size than it says");
     if (!(r.grid.cell > 0) || !std::isfinite(r.grid.x) || !std::isfinite(r.grid.y)) found("a raster that is nowhere");
@@ -71,28 +71,28 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     try {
         switch (data[0] % 7) {
         case 0:
-            look_at(io::read_outlines(file("fuzz.geojson")));
+            inspect(io::read_outlines(file("fuzz.geojson")));
             break;
         case 1:
-            look_at(io::read_points(file("fuzz.geojson")));
+            inspect(io::read_points(file("fuzz.geojson")));
             break;
         case 2: {
             const auto grid = scratch.path / "grid.asc";
             write(grid, take(rest)), write(scratch.path / "grid.prj", rest);
-            look_at(io::read_raster(grid));
+            inspect(io::read_raster(grid));
             break;
         }
         case 3:
-            look_at(io::read_raster(file("fuzz.tif"), io::Window{-10, -10, 1000, 1000}));
+            inspect(io::read_raster(file("fuzz.tif"), io::Window{-10, -10, 1000, 1000}));
             break;
         case 4:
-            look_at(io::read_raster(file("fuzz.xml")));
+            inspect(io::read_raster(file("fuzz.xml")));
             break;
         case 5:
-            look_at(io::read_outlines(shapefile(scratch.path, rest)));
+            inspect(io::read_outlines(shapefile(scratch.path, rest)));
             break;
         default:
-            look_at(io::read_points(shapefile(scratch.path, rest)));
+            inspect(io::read_points(shapefile(scratch.path, rest)));
         }
     } catch (const BadInput& e) {
         judge_refusal(e.what());

@@ -12,7 +12,7 @@ using namespace kuzure::fuzz;
 
 namespace {
 
-void look_at(const io::MachineProfile& m)
+void inspect(const io::MachineProfile& m)
 {
     if (m.name.empty() || m.node.count < 1 || m.node.ranks < 1 || m.node.threads_per_core < 1)
         found("a machine without nodes, ranks or threads");
@@ -23,7 +23,7 @@ void look_at(const io::MachineProfile& m)
         if (!(x > 0) || !std::isfinite(x)) found("a cost that is none");
 }
 
-void look_at(const io::Sweep& s)
+void inspect(const io::Sweep& s)
 {
     if (s.points.empty() || s.points.size() > 100000 || s.threads < 1 || s.measures.empty()) found("a sweep of nothing, or of too much");
     for (const auto& p : s.points)
@@ -50,10 +50,10 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     try {
         switch (data[0] % 3) {
         case 0:
-            look_at(io::parse_machine_profile(rest, "fuzz.toml", {machines}));
+            inspect(io::parse_machine_profile(rest, "fuzz.toml", {machines}));
             break;
         case 1:
-            look_at(io::parse_sweep(rest, "fuzz.toml"));
+            inspect(io::parse_sweep(rest, "fuzz.toml"));
             break;
         default: {
             const auto file = scratch.path / "fuzz.job.sh";

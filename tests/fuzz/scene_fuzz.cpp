@@ -17,7 +17,7 @@ namespace {
 bool finite(Vector a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 
 /// What an accepted scene's events make of it, at the times at which something happens.
-void look_at_stages(const Scene& s)
+void inspect_stages(const Scene& s)
 {
     if (s.events.empty() || s.events.size() > 20) return;
     const auto order = scene::order_of_events(s);
@@ -63,7 +63,7 @@ struct Files : Scratch {
     }
 };
 
-void look_at_uncertain(const scene::Uncertain& u)
+void inspect_uncertain(const scene::Uncertain& u)
 {
     for (const auto& t : {u.friction, u.bed_friction, u.thickness})
         if (t && !(t->low <= t->likely && t->likely <= t->high)) found("a distribution without order");
@@ -94,12 +94,12 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
         }
         if (!(again == scene)) found("a scene reads back as another");
         if (io::scene_hash(again) != io::scene_hash(scene)) found("a scene reads back with another hash");
-        look_at_stages(scene);
+        inspect_stages(scene);
     } catch (const BadInput& e) {
         judge_refusal(e.what());
     }
     try {
-        if (const auto u = io::parse_uncertain(text, name, sets)) look_at_uncertain(*u);
+        if (const auto u = io::parse_uncertain(text, name, sets)) inspect_uncertain(*u);
     } catch (const BadInput& e) {
         if (accepted) found("what is uncertain of a scene that was accepted is refused");
         judge_refusal(e.what());

@@ -1,7 +1,7 @@
 // Any bytes are a table or a refusal in words. The first byte of the input chooses whose:
 //   0  a record of ground motion; 1  points with names; 2  history.csv, as the report reads it.
-#include "io/time_record.hpp"
 #include "io/named_points.hpp"
+#include "io/time_record.hpp"
 #include "solver/app/report/record.hpp"
 #include "solver/core/ensure.hpp"
 #include "tests/fuzz/fuzz.hpp"
@@ -13,7 +13,7 @@ using namespace kuzure::fuzz;
 
 namespace {
 
-void look_at_motion(const std::vector<std::array<double, 4>>& rows)
+void inspect_motion(const std::vector<std::array<double, 4>>& rows)
 {
     if (rows.size() < 2) found("a record without two rows");
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -23,7 +23,7 @@ void look_at_motion(const std::vector<std::array<double, 4>>& rows)
     }
 }
 
-void look_at_points(const io::NamedPoints& all)
+void inspect_points(const io::NamedPoints& all)
 {
     std::set<std::string> names;
     for (const auto& p : all.points) {
@@ -44,10 +44,10 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     try {
         switch (data[0] % 3) {
         case 0:
-            write(file, rest), look_at_motion(io::read_time_record(file, {"ground motion", "m/s^2"}));
+            write(file, rest), inspect_motion(io::read_time_record(file, {"ground motion", "m/s^2"}));
             break;
         case 1:
-            write(file, rest), look_at_points(io::read_named_points(file));
+            write(file, rest), inspect_points(io::read_named_points(file));
             break;
         default: {
             const auto table = report::read_table(std::string(rest));

@@ -13,8 +13,11 @@ ROOT = Path(root)
 # A word: paths where names may hold it, and names that may be anywhere.
 HOMES = {
     "look": (r"", r""),
-    "sweep": (r"io/sweep_file|solver/app/(study/|commands/study)|tests/unit/study_test", r""),
-    "twin": (r"solver/app/(run|study|report)/|solver/app/commands/run|solver/app/hazard/run_scene|tests/unit/study_test", r""),
+    "sweep": (r"io/sweep_file|solver/app/(study/|commands/study)|tests/unit/study_test|tests/fuzz/profiles_fuzz", r""),
+    "twin": (
+        r"solver/app/(run|study|report)/|solver/app/commands/run|solver/app/hazard/run_scene|tests/unit/study_test|tests/fuzz/profiles_fuzz",
+        r"",
+    ),
     "cut": (
         r"decomposition/|solver/run/(balance|blocks|retry|scaling)|solver/app/(scaling/|commands/scale)|tests/mpi/|tests/unit/predict_test",
         r"recut_every_?|cut_(start|state)|cuts",

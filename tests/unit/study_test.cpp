@@ -1,5 +1,4 @@
 // Studies: sweep files and their messages, Richardson extrapolation, Pareto fronts, profiles, twins, the dial, presets.
-#include "io/owner.hpp"
 #include "io/scene_file.hpp"
 #include "io/scene_keys.hpp"
 #include "io/sweep_file.hpp"
@@ -7,7 +6,6 @@
 #include "solver/app/study/convergence.hpp"
 #include "solver/app/study/dial.hpp"
 #include "solver/app/study/profile.hpp"
-#include "solver/app/study/runs.hpp"
 #include "solver/app/study/study.hpp"
 #include "solver/app/study/twins.hpp"
 #include "solver/scene/fill.hpp"
@@ -17,7 +15,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <unistd.h>
 
 using namespace kuzure;
 using namespace kuzure::study;
@@ -404,32 +401,4 @@ TEST(Dial, WantedErrors)
     EXPECT_NEAR(parse_accuracy("0.5 %"), 0.005, 1e-12);
     EXPECT_NEAR(parse_accuracy("0.1"), 0.1, 1e-12);
     for (const char* bad : {"", "x", "5%%", "0", "-1%", "90%", "5 percent"}) EXPECT_THROW(parse_accuracy(bad), BadInput) << bad;
-}
-
-// A starter that is killed leaves a run that has not begun to write, let alone ended: the next starter's run may come second.
-TEST(Runs, AChildThatAnEarlierOneKeptOutIsStartedAgainAFewTimes)
-{
-    const auto folder = io::Path(::testing::TempDir()) / fmt::format("kuzure-runs-{}", ::getpid());
-    std::filesystem::create_directories(folder / "run");
-    std::string words;
-    {
-        const io::Ownership earlier(io::hold(folder / "run"), [](const std::string&) {});
-        try {
-            io::Ownership::refuse_if_owned(io::hold(folder / "run"));
-        } catch (const BadInput& e) {
-            words = e.what();
-        }
-    }
-    const auto log = folder / "log.txt";
-    io::write_lightly(log, "a warning\nkuzure: " + words + "\n");
-    int times = 2;
-    EXPECT_FALSE(waited_for_an_earlier_run(3, log, folder / "run", times));
-    EXPECT_TRUE(waited_for_an_earlier_run(2, log, folder / "run", times));
-    EXPECT_TRUE(waited_for_an_earlier_run(2, log, folder / "run", times));
-    EXPECT_FALSE(waited_for_an_earlier_run(2, log, folder / "run", times)) << "somebody else's run may go on for days";
-    times = 2;
-    io::write_lightly(log, "kuzure: scene.toml:3: time.end: expected a number\n");
-    EXPECT_FALSE(waited_for_an_earlier_run(2, log, folder / "run", times)) << "a scene that is refused stays refused";
-    EXPECT_EQ(times, 2);
-    std::filesystem::remove_all(folder);
 }
