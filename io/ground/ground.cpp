@@ -95,7 +95,7 @@ private:
             const auto& [file, which] = !r.thickness_map.empty() ? std::pair(r.thickness_map, ".thickness_map")
                                         : !r.surface.empty()     ? std::pair(r.surface, ".surface")
                                                                  : std::pair(r.after, ".after");
-            at_key(key + which, [&] { return take_extent(m, file), 0; });
+            at_key(key + which, [&, &file = file] { return take_extent(m, file), 0; });
         }
         masses_.push_back(std::move(m));
     }
