@@ -16,6 +16,8 @@ double column_bytes(const Scene& scene, const Filling& filling)
         if (is(field::stress_rate)) return !leap_frog && scene.effects.stress_diffusion.has_value();
         if (is(field::wall_slip, field::wall_pressure, field::wall_friction)) return !leap_frog && coulomb;
         if (is(field::wall_force)) return !leap_frog && std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); });
+        if (is(field::load, field::load_push)) return !scene.loads.empty();
+        if (is(field::unstored)) return std::ranges::any_of(scene.loads, [](const Load& l) { return l.plate; });
         if (is(field::opened_volume)) return remembers;
         if (is(field::activity)) return scene.accuracy.sleep_below > 0;
         return true;

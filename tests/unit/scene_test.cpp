@@ -316,4 +316,9 @@ TEST(Scene, ColumnsAreCounted)
     auto paper = s;
     paper.accuracy.scheme = Scheme::LeapFrog, paper.soils[0].opened_volume = OpenedVolume::Forgotten;
     EXPECT_EQ(column_bytes(paper, Filling(paper)), 1000 * (30 * 8 + 8 + 4));
+    auto loaded = s;
+    loaded.loads = {{.pressure = 1.0, .normal = Vector{0, 0, 1}}}; // who pushes, and how much: 3
+    EXPECT_EQ(column_bytes(loaded, Filling(loaded)), 1000 * (27 * 8 + 8 + 4 + 4));
+    loaded.loads[0].plate = true; // forces that no energy stores: 3
+    EXPECT_EQ(column_bytes(loaded, Filling(loaded)), 1000 * (30 * 8 + 8 + 4 + 4));
 }
