@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 #include <map>
 #include <sstream>
+#include <utility>
 
 namespace kuzure::io {
 namespace {
@@ -228,9 +229,9 @@ private:
     template <class Body> void inlined(const std::string& path, Body body)
     {
         std::string inside;
-        inline_ = &inside;
+        std::string* const outer = std::exchange(inline_, &inside);
         body();
-        inline_ = nullptr;
+        inline_ = outer;
         emit(path, "{ " + inside + " }");
     }
     Purpose purpose_;

@@ -96,6 +96,8 @@ def bits():
         check(summary(other)["state_hash"] == one["state_hash"], f"{other}: the bits of 1 x 1")
         for name in ("history.csv", "forces.csv", "events.csv"):
             check(raw(other, name) == raw("one", name), f"{other}: the same {name}")
+    run(runs.path("one", "scene.toml"), "written")
+    check(summary("written")["state_hash"] == one["state_hash"], "the scene that the run has written is the one it was given")
     # restarts where events begin and end, and from a checkpoint in the middle of a motion
     run(path, "legs", extra=["--set", "time.end=0.1"])
     run(path, "legs", 2, extra=["--restart", "--set", "time.end=0.15"])
