@@ -119,6 +119,11 @@ public:
         team_.min(std::span<double>(low)), team_.max(std::span<double>(high));
         // Between samples, so that rounding decides nothing on a lattice.
         low_ = {low[0] - 0.25 * spacing_, low[1] - 0.25 * spacing_};
+        const double wide[2] = {high[0] - low[0], dimensions_ == 3 ? high[1] - low[1] : 0.0};
+        if ((wide[0] / sample() + 2) * (wide[1] / sample() + 2) > most_samples)
+            throw NumbersFailed(fmt::format("{} pushes soil that lies over {:.3g} by {:.3g} m, more than can be seen along its normal at "
+                                            "once. Remedy: a box around each part of it, with a load of its own",
+                                            scene::name_of_load(scene, number - 1), wide[0], wide[1]));
         for (std::size_t k = 0; k < 2; ++k) count_[k] = low[k] > high[k] ? 0 : std::size_t((high[k] - low_[k]) / sample() + 1) + 1;
         if (dimensions_ == 2) count_[1] = std::min<std::size_t>(count_[1], 1);
     }
@@ -147,6 +152,7 @@ public:
 
 private:
     static constexpr double infinite = std::numeric_limits<double>::infinity();
+    static constexpr double most_samples = 1 << 26; // half a gigabyte of numbers
     double sample() const { return 0.5 * spacing_; }
     double area_of_particle() const { return dimensions_ == 3 ? spacing_ * spacing_ : spacing_; }
     double along_a(Index i) const { return dot(p_[field::position][i], a_); }

@@ -63,7 +63,8 @@ void check_loads(const Scene& s, Issues& issues)
         if (l.traction && !l.normal)
             error("", "expected a normal with a traction, which acts on the area that is seen along it, found none; for a level surface "
                       "write normal = [0.0, 0.0, 1.0]");
-        if (l.normal && *l.normal == Vector{}) error(".normal", "expected a direction, found [0, 0, 0]; upward: [0.0, 0.0, 1.0]");
+        if (l.normal && !(length(*l.normal) > 1e-100)) // its square must not vanish
+            error(".normal", "expected a direction, found one without length; upward: [0.0, 0.0, 1.0]");
         if (l.follow && (l.traction || l.normal))
             error(".follow", "expected follow with a pressure alone, which keeps to the faces as they turn, found traction or normal; "
                              "leave one out");

@@ -281,7 +281,7 @@ def bits():
     check(summary("legs")["state_hash"] == one["state_hash"], "three legs: the bits of one run")
     run(path, "stopped", extra=["--max-minutes", "0.0001"], expect=5)
     for leg in range(200):
-        if run(path, "stopped", 1 + leg % 2, extra=["--restart", "--max-minutes", "0.0015"], expect=None).returncode == 0:
+        if run(path, "stopped", 1 + leg % 2, extra=["--restart", "--max-minutes", f"{0.0015 * 1.2**leg:.4f}"], expect=None).returncode == 0:
             break
     check(summary("stopped")["state_hash"] == one["state_hash"], f"taken up {leg + 1} times: the bits of one run")
     off, largest = unaccounted("one")
@@ -301,6 +301,7 @@ def refused():
             "both": (with_(load("pressure = 1.0\ntraction = [1.0, 0.0, 0.0]", more="normal = [0.0, 0.0, 1.0]")), "found both"),
             "no normal": (with_(load("traction = [1.0, 0.0, 0.0]")), "normal"),
             "a normal of no length": (with_(load("pressure = 1.0", more="normal = [0.0, 0.0, 0.0]")), "direction"),
+            "a normal of hardly any": (with_(load("pressure = 1.0", more="normal = [0.0, 0.0, 1e-170]")), "direction"),
             "follow along a normal": (with_(load("pressure = 1.0", more="follow = true\nnormal = [0.0, 0.0, 1.0]")), "follow"),
             "negative": (with_(load("pressure = -1.0")), "load.0.pressure"),
             "no body": (with_(load("pressure = 1.0", more='body = "nobody"')), "nobody"),
@@ -319,6 +320,12 @@ def refused():
             "leap-frog": (with_(good + '[accuracy]\nscheme = "leap-frog"\n'), "staggered"),
         }
     )
+    # two stones so far apart that no grid of samples holds both
+    far = [body((x, x, 0), (x + 1, x + 1, 1)) for x in (0, 1.2e3)]
+    wide = text([*far, load("pressure = 1.0", more="normal = [0.0, 0.0, 1.0]")], dimensions=3)
+    for ranks in (1, 2):
+        done = run(scene("far", wide), "far", ranks, expect=3, extra=["--force"])
+        check("seen along its normal" in done.stderr and "Remedy" in done.stderr, f"far apart, {ranks} ranks: {done.stderr.strip()[-150:]}")
     # found as it begins: where the soil is by then
     late = '[[event]]\nat = 0.05\nadd = "fill"\n'
     for what, more in (

@@ -106,7 +106,10 @@ def bits():
     run(path, "stopped", extra=["--max-minutes", "0.0001"], expect=5)
     steps = summary("stopped")["steps"]
     for leg in range(200):
-        if runs.run(path, "stopped", 1 + leg % 2, extra=["--restart", "--max-minutes", "0.0015"], expect=None).returncode == 0:
+        if (
+            runs.run(path, "stopped", 1 + leg % 2, extra=["--restart", "--max-minutes", f"{0.0015 * 1.2**leg:.4f}"], expect=None).returncode
+            == 0
+        ):
             break
     check(0 < steps < one["steps"], f"a run stopped after {steps} of {one['steps']} steps")
     check(summary("stopped")["state_hash"] == one["state_hash"], f"and taken up {leg + 1} times: the bits of one run")
