@@ -13,6 +13,7 @@ struct WideUnits {
     std::int64_t high = 0, low = 0; // 0 <= low < 2^40 after add()
     /// |units| < 2^62.
     void add(std::int64_t units) { *this = sum(high, low + units); }
+    void add(const WideUnits& o) { *this = sum(high + o.high, low + o.low); }
     double value() const { return std::ldexp(double(high), 40) + double(low); }
     static WideUnits sum(std::int64_t high, std::int64_t low)
     {

@@ -174,9 +174,7 @@ bool WallForces::add_impulse(const Particles& p, double seconds, Clock& clock)
 #pragma omp critical
         {
             for (std::size_t k = 0; k < mine.size(); ++k)
-                for (std::size_t a = 0; a < 3; ++a)
-                    clock.impulse[k][a] =
-                        WideUnits::sum(clock.impulse[k][a].high + mine[k][a].high, clock.impulse[k][a].low + mine[k][a].low);
+                for (std::size_t a = 0; a < 3; ++a) clock.impulse[k][a].add(mine[k][a]);
             outgrown = outgrown || too_large;
         }
     }

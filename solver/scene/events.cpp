@@ -40,14 +40,10 @@ void change(Soil& soil, const SoilChange& c, double share)
 }
 
 /// Acceleration (m/s^2) of the ground at a time of its record (s); none before and after it.
-Vector acceleration(const std::vector<std::array<double, 4>>& rows, double time)
+Vector acceleration(const Record& shaking, double time)
 {
-    const auto after = std::upper_bound(rows.begin(), rows.end(), time, [](double t, const auto& row) { return t < row[0]; });
-    if (after == rows.begin() || (after == rows.end() && time > rows.back()[0])) return {};
-    if (after == rows.end()) return {rows.back()[1], rows.back()[2], rows.back()[3]};
-    const auto &a = *(after - 1), &b = *after;
-    const double share = (time - a[0]) / (b[0] - a[0]);
-    return {between(a[1], b[1], share), between(a[2], b[2], share), between(a[3], b[3], share)};
+    const auto& rows = *shaking.rows;
+    return time < rows.front()[0] || time > rows.back()[0] ? Vector{} : value_at(shaking, time);
 }
 
 /// Index of what has a name; -1 where nothing has.
@@ -71,6 +67,16 @@ void set_present(Scene& s, const std::string& name, bool there)
 }
 
 bool Record::operator==(const Record& o) const { return rows == o.rows || (rows && o.rows && *rows == *o.rows); }
+Vector value_at(const Record& record, double time)
+{
+    const auto& rows = *record.rows;
+    const auto value = [](const std::array<double, 4>& row) { return Vector{row[1], row[2], row[3]}; };
+    const auto after = std::upper_bound(rows.begin(), rows.end(), time, [](double t, const auto& row) { return t < row[0]; });
+    if (after == rows.begin()) return value(rows.front());
+    if (after == rows.end()) return value(rows.back());
+    const auto &a = *(after - 1), &b = *after;
+    return value(a) + ((time - a[0]) / (b[0] - a[0])) * (value(b) - value(a));
+}
 
 double begin_of(const Event& e) { return e.at ? *e.at : e.from.value_or(0); }
 double end_of(const Event& e)
@@ -128,7 +134,7 @@ Scene stage_of(const Scene& start, int begun, double time)
         }
         if (const int l = e.load ? load_named(now, e.load->name) : -1; l >= 0)
             move(now.loads[std::size_t(l)].factor, e.load->factor, share);
-        if (e.shaking.rows) shaken = shaken + acceleration(*e.shaking.rows, time - begin_of(e));
+        if (e.shaking.rows) shaken = shaken + acceleration(e.shaking, time - begin_of(e));
     }
     for (const int w : moving_walls(start)) now.walls[std::size_t(w)].pose = pose_at(start, w, begun, time);
     // Seen from ground that moves, soil feels its acceleration the other way.

@@ -7,6 +7,8 @@
 
 namespace kuzure::scene {
 
+/// Of a record at a time, s: straight between two rows, beyond the first and the last as there.
+Vector value_at(const Record&, double time);
 /// When an event begins and when all of it has happened, s; ground motion lasts as long as its record.
 double begin_of(const Event&);
 double end_of(const Event&);

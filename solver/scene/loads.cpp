@@ -87,8 +87,9 @@ void check_loads(const Scene& s, Issues& issues)
 
 void check_loaded_soil(const Scene& s, const Filling& filling, Issues& issues)
 {
-    if (!s.start.from.empty()) return;                   // soil lies where the other run left it
-    std::unordered_map<std::int64_t, std::size_t> loads; // by particle
+    if (!s.start.from.empty()) return; // soil lies where the other run left it
+    const bool several = std::ranges::count_if(s.loads, &Load::present) > 1;
+    std::unordered_map<std::int64_t, std::size_t> loads; // by particle, where more than one may push it
     for (std::size_t k = 0; k < s.loads.size(); ++k) {
         const Load& l = s.loads[k];
         if (!l.present) continue;
@@ -98,6 +99,7 @@ void check_loaded_soil(const Scene& s, const Filling& filling, Issues& issues)
         filling.for_each_soil_in(filling.soil_bounds(), [&](std::int64_t id, Vector x, int body) {
             if (!s.bodies[std::size_t(body)].present || !pushes(s, l, body, x)) return;
             found = true;
+            if (!several) return;
             if (const auto [entry, fresh] = loads.emplace(id, k); !fresh && other == k) other = entry->second;
         });
         if (!found)

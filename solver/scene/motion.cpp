@@ -17,17 +17,6 @@ Pose turn_about(Vector axis, double angle)
     // The rows of a turn are the axes turned back.
     return {{row({1, 0, 0}), row({0, 1, 0}), row({0, 0, 1})}, {}};
 }
-/// Way of a record (m) after so many seconds: straight from row to row, then at its end.
-Vector along(const Record& path, double seconds)
-{
-    const auto& rows = *path.rows;
-    const auto at = [](const std::array<double, 4>& row) { return Vector{row[1], row[2], row[3]}; };
-    const auto after = std::upper_bound(rows.begin(), rows.end(), seconds, [](double t, const auto& row) { return t < row[0]; });
-    if (after == rows.begin()) return at(rows.front());
-    if (after == rows.end()) return at(rows.back());
-    const auto &a = *(after - 1), &b = *after;
-    return at(a) + ((seconds - a[0]) / (b[0] - a[0])) * (at(b) - at(a));
-}
 /// Seconds at full speed that go as far as a move of `whole` seconds has gone after so many, whose speed grows and ends in `ramp`.
 double at_full_speed(double seconds, double whole, double ramp)
 {
@@ -42,7 +31,7 @@ Pose done(const Event& e, const WallMove& m, double time)
     const double whole = end_of(e) - begin_of(e), gone = std::clamp(time - begin_of(e), 0.0, whole);
     Pose p;
     if (m.path.rows) {
-        p.shift = along(m.path, gone);
+        p.shift = value_at(m.path, gone);
         return p;
     }
     const double seconds = at_full_speed(gone, whole, m.ramp);

@@ -123,7 +123,7 @@ void read_scene(Record& r)
     }
 }
 
-/// Calls visit(cells) for the rows of a table of text that have a cell for each name; rows without end are not there.
+/// Calls visit(line, cells) for the rows of a table of text that have a cell for each name; rows without end are not there.
 template <class Visit> void for_each_row(std::string_view text, Visit visit)
 {
     std::size_t names = 0;
@@ -131,12 +131,13 @@ template <class Visit> void for_each_row(std::string_view text, Visit visit)
         const std::size_t end = text.find('\n');
         if (end == text.npos) return;
         std::vector<std::string> cells(1);
-        for (const char c : text.substr(0, end))
+        const std::string_view row = text.substr(0, end);
+        for (const char c : row)
             if (c == ',') cells.emplace_back();
             else cells.back() += c;
         text.remove_prefix(end + 1);
         if (line == 0) names = cells.size();
-        else if (line > 1 && cells.size() == names) visit(cells);
+        else if (line > 1 && cells.size() == names) visit(row, cells);
     }
 }
 
@@ -144,19 +145,18 @@ void read_stages(Record& r, Reader& from)
 {
     constexpr std::size_t most_walls = 100;
     if (from.there("events.csv"))
-        for_each_row(from.text("events.csv", "what happened is unknown"), [&](const auto& cells) { r.events.push_back(cells); });
+        for_each_row(from.text("events.csv", "what happened is unknown"),
+                     [&](std::string_view, const auto& cells) { r.events.push_back(cells); });
     if (!from.there("forces.csv")) return;
     const std::string text = from.text("forces.csv", "no forces on walls", 128 * MiB);
     std::map<std::string, std::string> rows; // by wall
     std::vector<std::string> order;
-    for_each_row(text, [&](const auto& cells) {
+    for_each_row(text, [&](std::string_view row, const auto& cells) {
         if (cells.size() < 3) return;
         const auto found = rows.find(cells[1]);
         if (found == rows.end() && rows.size() == most_walls) return;
         if (found == rows.end()) order.push_back(cells[1]);
-        std::string& to = rows[cells[1]];
-        for (std::size_t k = 0; k < cells.size(); ++k) to += (k ? "," : "") + cells[k];
-        to += '\n';
+        rows[cells[1]].append(row) += '\n';
     });
     const std::size_t head = text.find('\n');
     for (const auto& wall : order) r.forces.emplace_back(wall, read_table(text.substr(0, head) + "\n#\n" + rows[wall]));

@@ -1,7 +1,7 @@
 #include "solver/app/report/stages.hpp"
+#include "io/csv.hpp"
 #include "solver/app/report/page.hpp"
 #include "solver/app/report/values.hpp"
-#include <charconv>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -11,11 +11,7 @@ namespace {
 
 constexpr std::size_t most_rows = 100;
 
-double number(const std::string& cell)
-{
-    double x = 0;
-    return std::from_chars(cell.data(), cell.data() + cell.size(), x).ec == std::errc{} ? usable(x) : std::nan("");
-}
+double number(const std::string& cell) { return usable(io::csv_number(cell).value_or(std::nan(""))); }
 
 std::string events(const Record& r)
 {
