@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The whole test suite from a fresh machine: install, build, test, then the unit tests and the two-rank MPI tests again
-# under the sanitizers. Slower studies: ctest --test-dir build/release -L long. Ends with "N passed, N failed".
+# The whole test suite from a fresh machine: install, build, test, then the readers' replays, the unit tests and the two-rank MPI tests
+# again under the sanitizers (without the tests of solver/app, which takes two fifths of the compiler's time). Slower studies:
+# ctest --test-dir build/release -L long. Ends with "N passed, N failed".
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit
 source jobs/environment.sh
@@ -81,8 +82,9 @@ if [ $left -gt 360 ]; then
     echo
     asan_note=
     # The compiler cache keeps what a build that was cut short has done.
-    mapfile -t checked < <(basename -a -s .cpp tests/unit/*_test.cpp tests/mpi/*_test.cpp)
-    timeout $((left - 150)) jobs/build.sh asan kuzure scene_replay checkpoint_replay "${checked[@]}"
+    mapfile -t checked < <(grep -LE '#include "solver/app/' tests/{unit,mpi}/*_test.cpp | xargs basename -a -s .cpp)
+    for fuzzer in tests/fuzz/*_fuzz.cpp; do checked+=("$(basename "$fuzzer" _fuzz.cpp)_replay"); done
+    timeout $((left - 150)) jobs/build.sh asan "${checked[@]}"
     status=$?
     if [ $status = 124 ]; then
         asan_note="The sanitizers were not run: their build did not fit into $minutes minutes. Run again: it goes on where it stopped."
@@ -95,7 +97,8 @@ if [ $left -gt 360 ]; then
         export ASAN_OPTIONS=detect_leaks=1:fast_unwind_on_malloc=0
         export LSAN_OPTIONS=suppressions=$PWD/tests/lsan.supp:print_suppressions=0
         export UBSAN_OPTIONS=print_stacktrace=1
-        suite sanitizers build/asan -R '^(unit\..*|mpi\..*\.2)$' -LE "$slow" -j "$KUZURE_CORES"
+        names=$(IFS='|' && echo "${checked[*]}")
+        suite sanitizers build/asan -R "^(unit\.($names)|mpi\.($names)\.2)\$" -LE "$slow" -j "$KUZURE_CORES"
     fi
 fi
 finish

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #if KUZURE_TERRAIN
 #include <limits>
+#include <map>
 #include <proj.h>
 #include <proj_experimental.h>
 #endif
@@ -47,12 +48,19 @@ struct FreePj {
 using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
 using Pj = std::unique_ptr<PJ, FreePj>;
 
-Context context()
+Context new_context()
 {
     Context c(proj_context_create());
     proj_log_level(c.get(), PJ_LOG_NONE);
     proj_context_set_enable_network(c.get(), 0); // the same answer everywhere
     return c;
+}
+
+/// This thread's: to open the library's database takes longer than most of what is asked of it.
+PJ_CONTEXT* context()
+{
+    thread_local const Context c = new_context();
+    return c.get();
 }
 
 bool is_crs(const Pj& p) { return p && proj_is_crs(p.get()); }
@@ -110,60 +118,91 @@ bool geographic(const Pj& p)
     return type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
 }
 
-} // namespace
+constexpr auto blank = " \t\r\n";
 
-std::string crs_from(const std::string& text, const std::string& who)
+/// What stands between blanks; PROJ would keep those behind a number as part of it.
+std::string trimmed(const std::string& text)
 {
-    const Context c = context();
-    Pj p(proj_create(c.get(), text.c_str()));
+    const auto first = text.find_first_not_of(blank);
+    return first == text.npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
+}
+
+/// Number of an authority, WKT, PROJ string, URN, PROJJSON: all else PROJ takes for a name, and finds a system whose name is like it.
+bool says_a_system(std::string_view text)
+{
+    if (text.empty()) return false;
+    if (text.front() == '{' || text.find("+proj=") != text.npos) return true;
+    const auto word = text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_");
+    if (word == text.npos || word == 0) return false;
+    const char next = text[text.find_first_not_of(blank, word)];
+    return next == '[' || next == '(' || (next == ':' && text.find_first_of(blank) == text.npos);
+}
+
+std::string newly_read(const std::string& text, const std::string& who)
+{
+    auto* c = context();
+    Pj p(says_a_system(text) ? proj_create(c, text.c_str()) : nullptr);
     if (!is_crs(p) && text.find("+proj=") != text.npos && text.find("+type=crs") == text.npos)
-        p.reset(proj_create(c.get(), (text + " +type=crs").c_str()));
+        p.reset(proj_create(c, (text + " +type=crs").c_str()));
     const auto shown = text.substr(0, 80);
     if (!is_crs(p))
         throw BadInput(fmt::format("{}: expected a coordinate system, found \"{}\". Remedy: name it by its EPSG number, as "
                                    "\"EPSG:6670\" (epsg.io finds it)",
                                    who, shown));
-    p = horizontal(c.get(), std::move(p));
+    p = horizontal(c, std::move(p));
     const auto type = is_crs(p) ? proj_get_type(p.get()) : PJ_TYPE_UNKNOWN;
     if (type != PJ_TYPE_PROJECTED_CRS && type != PJ_TYPE_GEOGRAPHIC_2D_CRS)
         throw BadInput(fmt::format("{}: expected a projected or geographic coordinate system, found \"{}\", which does not say where in "
                                    "plan. Remedy: name the map's system by its EPSG number, as \"EPSG:6670\"",
                                    who, shown));
-    return wkt_of(c.get(), known(c.get(), std::move(p)).get());
+    return wkt_of(c, known(c, std::move(p)).get());
+}
+
+} // namespace
+
+std::string crs_from(const std::string& given, const std::string& who)
+{
+    const auto text = trimmed(given);
+    // Each of hundreds of tiles names the one system of them all.
+    thread_local std::map<std::string, std::string> already_read;
+    if (const auto found = already_read.find(text); found != already_read.end()) return found->second;
+    auto wkt = newly_read(text, who);
+    if (already_read.size() >= 64) already_read.clear();
+    already_read.emplace(text, wkt);
+    return wkt;
 }
 
 std::string crs_name(const std::string& wkt)
 {
-    const Context c = context();
-    const Pj p = made(c.get(), wkt);
+    auto* c = context();
+    const Pj p = made(c, wkt);
     const char* code = proj_get_id_code(p.get(), 0);
     return code ? fmt::format("{} ({}:{})", proj_get_name(p.get()), proj_get_id_auth_name(p.get(), 0), code) : proj_get_name(p.get());
 }
 
 int epsg_of(const std::string& wkt)
 {
-    const Context c = context();
-    const Pj p = made(c.get(), wkt);
+    auto* c = context();
+    const Pj p = made(c, wkt);
     const char *code = proj_get_id_code(p.get(), 0), *authority = proj_get_id_auth_name(p.get(), 0);
     return code && authority && std::string(authority) == "EPSG" ? std::atoi(code) : 0;
 }
 
 bool is_geographic(const std::string& wkt)
 {
-    const Context c = context();
-    return geographic(made(c.get(), wkt));
+    auto* c = context();
+    return geographic(made(c, wkt));
 }
 
 double metres_per_unit(const std::string& wkt)
 {
-    const Context c = context();
-    const Pj p = made(c.get(), wkt);
+    auto* c = context();
+    const Pj p = made(c, wkt);
     if (geographic(p)) return 0;
-    const Pj axes(proj_crs_get_coordinate_system(c.get(), p.get()));
+    const Pj axes(proj_crs_get_coordinate_system(c, p.get()));
     double factor[2] = {0, 0};
     for (int k = 0; k < 2; ++k)
-        if (!axes || !proj_cs_get_axis_info(c.get(), axes.get(), k, nullptr, nullptr, nullptr, &factor[k], nullptr, nullptr, nullptr))
-            return 0;
+        if (!axes || !proj_cs_get_axis_info(c, axes.get(), k, nullptr, nullptr, nullptr, &factor[k], nullptr, nullptr, nullptr)) return 0;
     return factor[0] == factor[1] ? factor[0] : 0;
 }
 
@@ -171,15 +210,15 @@ bool same_crs(const std::string& a, const std::string& b)
 {
     if (a == b) return true;
     if (a.empty() || b.empty()) return false;
-    const Context c = context();
+    auto* c = context();
     // Compared as they are used: x to the east, y to the north.
-    const auto plain = [&](const std::string& wkt) { return Pj(proj_normalize_for_visualization(c.get(), made(c.get(), wkt).get())); };
+    const auto plain = [&](const std::string& wkt) { return Pj(proj_normalize_for_visualization(c, made(c, wkt).get())); };
     const Pj p = plain(a), q = plain(b);
-    if (p && q && proj_is_equivalent_to_with_ctx(c.get(), p.get(), q.get(), PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS)) return true;
+    if (p && q && proj_is_equivalent_to_with_ctx(c, p.get(), q.get(), PJ_COMP_EQUIVALENT_EXCEPT_AXIS_ORDER_GEOGCRS)) return true;
     // Without a datum's name its numbers count.
     if (!p || !q || (a.find("nknown") == a.npos && b.find("nknown") == b.npos)) return false;
     const auto numbers = [&](const Pj& x) {
-        const char* text = proj_as_proj_string(c.get(), x.get(), PJ_PROJ_5, nullptr);
+        const char* text = proj_as_proj_string(c, x.get(), PJ_PROJ_5, nullptr);
         return std::string(text ? text : "");
     };
     const auto said = numbers(p);
@@ -188,12 +227,12 @@ bool same_crs(const std::string& a, const std::string& b)
 
 bool lies_in(const std::string& wkt, double x, double y)
 {
-    const Context c = context();
-    const Pj p = made(c.get(), wkt);
+    auto* c = context();
+    const Pj p = made(c, wkt);
     double west = 0, south = 0, east = 0, north = 0;
-    if (!proj_get_area_of_use(c.get(), p.get(), &west, &south, &east, &north, nullptr) || west == -1000 || west > east) return true;
-    const Pj way(proj_create_crs_to_crs(c.get(), wkt.c_str(), "EPSG:4326", nullptr));
-    const Pj plain(way ? proj_normalize_for_visualization(c.get(), way.get()) : nullptr);
+    if (!proj_get_area_of_use(c, p.get(), &west, &south, &east, &north, nullptr) || west == -1000 || west > east) return true;
+    const Pj way(proj_create_crs_to_crs(c, wkt.c_str(), "EPSG:4326", nullptr));
+    const Pj plain(way ? proj_normalize_for_visualization(c, way.get()) : nullptr);
     if (!plain) return true;
     const PJ_COORD at = proj_trans(plain.get(), PJ_FWD, proj_coord(x, y, 0, HUGE_VAL));
     const double margin = 2;
@@ -202,8 +241,8 @@ bool lies_in(const std::string& wkt, double x, double y)
 
 std::string esri_wkt(const std::string& wkt)
 {
-    const Context c = context();
-    auto text = wkt_of(c.get(), made(c.get(), wkt).get(), PJ_WKT1_ESRI);
+    auto* c = context();
+    auto text = wkt_of(c, made(c, wkt).get(), PJ_WKT1_ESRI);
     return text.empty() ? wkt : text;
 }
 
@@ -214,7 +253,7 @@ struct Transform::Handle {
 
 Transform::Transform(const std::string& from, const std::string& to, const std::string& who) : handle_(std::make_unique<Handle>())
 {
-    handle_->c = context();
+    handle_->c = new_context();
     auto* c = handle_->c.get();
     // A "ballpark" way leaves the difference of the datums out, which may be hundreds of metres.
     const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};

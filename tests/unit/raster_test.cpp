@@ -145,6 +145,18 @@ TEST_F(Rasters, EveryKindThatGdalWrites)
     }
 }
 
+TEST(CoordinateSystems, ANameIsNotGuessedAt)
+{
+    // PROJ finds a system whose name is like each of these.
+    for (const char* text :
+         {"Tokyo", "JGD2011", "WGS 84", "JGD2011 / Japan Plane Rectangular CS", "EPSG:4326 and more", "lambert", "", " "})
+        EXPECT_THROW(crs_from(text, "test"), BadInput) << text;
+    const auto wkt = crs_from("EPSG:6670", "test");
+    for (const std::string& text :
+         {std::string("  EPSG:6670\r\n"), std::string("urn:ogc:def:crs:EPSG::6670"), wkt + "\n", "\t" + esri_wkt(wkt)})
+        EXPECT_EQ(crs_from(text, "test"), wkt) << text;
+}
+
 TEST_F(Rasters, WrongFilesAreRefusedWithTheirRemedy)
 {
     write("word.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 four\n");
