@@ -9,13 +9,13 @@
 namespace kuzure::hazard {
 namespace {
 
-constexpr double for_the_ensemble = 0.6, for_a_finer_run = 0.6; // shares of the time that is left then
+constexpr double for_the_ensemble = 0.6, for_a_finer_run = 0.75; // shares of the time that is left then
 
 /// Layers of runs that take so long, s.
 double layers_for(const Cost& c, double seconds)
 {
     const double steps = seconds - c.start;
-    return steps > 0 && c.steps > 0 ? std::min(most_layers, c.layers * std::pow(steps / c.steps, 0.25)) : 0;
+    return steps > 0 && c.steps > 0 ? std::min(most_layers, c.layers * std::pow(steps / c.steps, 1 / cost_power)) : 0;
 }
 
 /// To a tenth of a layer, downwards.
@@ -23,7 +23,7 @@ double rounded(double layers) { return std::floor(10 * layers + 1e-9) / 10; }
 
 } // namespace
 
-double Cost::seconds(double at) const { return start + steps * std::pow(at / layers, 4); }
+double Cost::seconds(double at) const { return start + steps * std::pow(at / layers, cost_power); }
 
 Plan make_plan(const Cost& c, double left, int members, double layers)
 {

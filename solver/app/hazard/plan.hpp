@@ -4,8 +4,11 @@
 
 namespace kuzure::hazard {
 
-/// Seconds of a run with all cores of the machine: what it takes before its first step, and its steps, which go with the fourth power of
-/// the layers (particles with the third, steps with the first).
+/// Pairs of a whole run go with this power of the layers: particles with the third, steps with the first, and the more layers, the fewer
+/// particles are at the surface, where neighbours are missing (measured: 4.15 to 4.25, docs/hazard.md).
+inline constexpr double cost_power = 4.25;
+
+/// Seconds of a run with all cores of the machine: what it takes before its first step, and its steps.
 struct Cost {
     double start = 0, steps = 0, layers = 4; // s, s, at so many layers
     double seconds(double at_layers) const;
