@@ -26,7 +26,7 @@ def tree():
     files += [f for f in ROOT.iterdir() if f.is_file()]
     words = set()
     for f in files:
-        if f.suffix in CODE and "tests/layers/pages_test.py" not in f.as_posix():
+        if (f.suffix in CODE or f.name == "CMakeLists.txt") and "tests/layers/pages_test.py" not in f.as_posix():
             words |= set(re.findall(r"\w+", f.read_text(errors="replace")))
     return {f.relative_to(ROOT).as_posix() for f in files}, words
 
