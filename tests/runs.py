@@ -73,9 +73,9 @@ class Runs:
     def scene(self, name, text):
         return self.write(name + ".toml", text)
 
-    def call(self, *args, expect=0, says=()):
+    def call(self, *args, expect=0, says=(), timeout=300):
         """The program in this directory."""
-        done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=self.work)
+        done = subprocess.run([program, *args], capture_output=True, text=True, timeout=timeout, cwd=self.work)
         good = done.returncode == expect and all(word in done.stderr for word in says)
         check(good, f"{' '.join(args)[-100:]}: exit {done.returncode}, expected {expect} {'' if good else done.stderr.strip()[-400:]}")
         return done

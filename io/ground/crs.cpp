@@ -127,23 +127,37 @@ std::string trimmed(const std::string& text)
     return first == text.npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
 }
 
-/// Number of an authority, WKT, PROJ string, URN, PROJJSON: all else PROJ takes for a name, and finds a system whose name is like it.
-bool says_a_system(std::string_view text)
+/// "EPSG:6670"; with the number of a system of heights behind a plus.
+Pj by_number(PJ_CONTEXT* c, const std::string& text)
 {
-    if (text.empty()) return false;
-    if (text.front() == '{' || text.find("+proj=") != text.npos) return true;
-    const auto word = text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_");
-    if (word == text.npos || word == 0) return false;
-    const char next = text[text.find_first_not_of(blank, word)];
-    return next == '[' || next == '(' || (next == ':' && text.find_first_of(blank) == text.npos);
+    const auto colon = text.find(':');
+    std::string authority = text.substr(0, colon), code = text.substr(colon + 1, text.find('+', colon) - colon - 1);
+    for (char& x : authority) x = x >= 'a' && x <= 'z' ? char(x - 'a' + 'A') : x;
+    return Pj(proj_create_from_database(c, authority.c_str(), code.c_str(), PJ_CATEGORY_CRS, 0, nullptr));
+}
+
+/// A number of an authority, a URN, WKT, a PROJ string, PROJJSON; all else PROJ would take for a name, and find a system whose name is like
+/// it.
+Pj by_its_form(PJ_CONTEXT* c, const std::string& text)
+{
+    constexpr auto word = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
+    const auto end = text.find_first_not_of(word);
+    const auto next = text.find_first_not_of(blank, end == text.npos ? text.size() : end);
+    const char mark = next == text.npos ? 0 : text[next];
+    if (text.find("+proj=") != text.npos) {
+        Pj p(proj_create(c, text.c_str()));
+        if (!is_crs(p) && text.find("+type=crs") == text.npos) p.reset(proj_create(c, (text + " +type=crs").c_str()));
+        return p;
+    }
+    if (text.starts_with("urn:ogc:def:crs:") || text.starts_with("{") || (end > 0 && (mark == '[' || mark == '(')))
+        return Pj(proj_create(c, text.c_str()));
+    return mark == ':' && next == end ? by_number(c, text) : Pj();
 }
 
 std::string newly_read(const std::string& text, const std::string& who)
 {
     auto* c = context();
-    Pj p(says_a_system(text) ? proj_create(c, text.c_str()) : nullptr);
-    if (!is_crs(p) && text.find("+proj=") != text.npos && text.find("+type=crs") == text.npos)
-        p.reset(proj_create(c, (text + " +type=crs").c_str()));
+    Pj p = by_its_form(c, text);
     const auto shown = text.substr(0, 80);
     if (!is_crs(p))
         throw BadInput(fmt::format("{}: expected a coordinate system, found \"{}\". Remedy: name it by its EPSG number, as "

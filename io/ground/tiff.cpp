@@ -43,7 +43,7 @@ std::string ascii_key(GTIF* keys, geokey_t key)
 /// The system that the GeoKeys name; empty where they name none.
 std::string crs_of(TIFF* tiff, const std::string& file)
 {
-    const GeoKeys keys(GTIFNew(tiff));
+    const auto keys = geo_keys(tiff);
     if (!keys) return "";
     const auto number = [&](geokey_t key) {
         unsigned short value = 0;
@@ -169,7 +169,7 @@ Layout layout(TIFF* tiff, const Path& path)
     l.info.crs = crs_of(tiff, file);
     unsigned short kind = RasterPixelIsArea;
     {
-        const GeoKeys keys(GTIFNew(tiff));
+        const auto keys = geo_keys(tiff);
         if (keys) GTIFKeyGetSHORT(keys.get(), GTRasterTypeGeoKey, &kind, 0, 1);
     }
     const bool geographic = !l.info.crs.empty() && is_geographic(l.info.crs);

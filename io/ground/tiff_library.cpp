@@ -14,7 +14,17 @@ void keep_words(const char*, const char* format, std::va_list arguments)
     last_words() = text;
 }
 
+void keep_words_on_keys(gtiff*, int, const char* format, ...)
+{
+    std::va_list arguments;
+    va_start(arguments, format);
+    keep_words("", format, arguments);
+    va_end(arguments);
+}
+
 } // namespace
+
+GeoKeys geo_keys(TIFF* tiff) { return GeoKeys(GTIFNewEx(tiff, keep_words_on_keys, nullptr)); }
 
 std::string& last_words()
 {

@@ -26,5 +26,7 @@ struct Free {
 };
 using Tiff = std::unique_ptr<TIFF, Close>;
 using GeoKeys = std::unique_ptr<GTIF, Free>;
+/// Those of a file that is open; null where it has none that can be read.
+GeoKeys geo_keys(TIFF*);
 
 } // namespace kuzure::io::ground

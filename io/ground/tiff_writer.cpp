@@ -52,7 +52,7 @@ Tiff open_memory(Memory& m)
 /// GeoKeys by EPSG's number where the system has one, else as ESRI's WKT, which GDAL and QGIS understand.
 void write_keys(TIFF* tiff, const std::string& crs)
 {
-    const GeoKeys keys(GTIFNew(tiff));
+    const auto keys = geo_keys(tiff);
     ensure(keys != nullptr, "GeoKeys cannot be written");
     const bool geographic = is_geographic(crs);
     const int model = geographic ? ModelTypeGeographic : ModelTypeProjected, epsg = epsg_of(crs);

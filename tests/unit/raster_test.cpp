@@ -148,13 +148,31 @@ TEST_F(Rasters, EveryKindThatGdalWrites)
 TEST(CoordinateSystems, ANameIsNotGuessedAt)
 {
     // PROJ finds a system whose name is like each of these.
-    for (const char* text :
-         {"Tokyo", "JGD2011", "WGS 84", "JGD2011 / Japan Plane Rectangular CS", "EPSG:4326 and more", "lambert", "", " "})
+    for (const char* text : {"Tokyo", "JGD2011", "WGS 84", "JGD2011 / Japan Plane Rectangular CS", "EPSG:4326 and more", "lambert", "", " ",
+                             "WGS:84", "Tokyo:x"})
         EXPECT_THROW(crs_from(text, "test"), BadInput) << text;
     const auto wkt = crs_from("EPSG:6670", "test");
-    for (const std::string& text :
-         {std::string("  EPSG:6670\r\n"), std::string("urn:ogc:def:crs:EPSG::6670"), wkt + "\n", "\t" + esri_wkt(wkt)})
+    for (const std::string& text : {std::string("  EPSG:6670\r\n"), std::string("epsg:6670+6695"),
+                                    std::string("urn:ogc:def:crs:EPSG::6670"), wkt + "\n", "\t" + esri_wkt(wkt)})
         EXPECT_EQ(crs_from(text, "test"), wkt) << text;
+}
+
+TEST_F(Rasters, TheLibrariesSayNothingThemselves)
+{
+    Raster r{hills(37, 23, -1500.5, 12000.5, 1), crs_from("EPSG:6670", "test")};
+    write_geotiff(file("a.tif"), r);
+    auto bytes = read_text(file("a.tif"), 1 << 20);
+    const char key[] = {1, 4, 0, 0, 1, 0}; // GTRasterTypeGeoKey, in its place, one number
+    const auto at = bytes.find(std::string(key, sizeof key));
+    ASSERT_NE(at, bytes.npos);
+    bytes[at + 4] = 100; // of them
+    write("b.tif", bytes);
+    testing::internal::CaptureStderr();
+    try {
+        read_raster(file("b.tif"));
+    } catch (const BadInput&) {
+    }
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST_F(Rasters, WrongFilesAreRefusedWithTheirRemedy)
