@@ -127,31 +127,29 @@ std::string trimmed(const std::string& text)
     return first == text.npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
 }
 
-/// "EPSG:6670"; with the number of a system of heights behind a plus.
-Pj by_number(PJ_CONTEXT* c, const std::string& text)
+/// A number of an authority, the number of a system of heights behind a plus left out.
+Pj by_number(PJ_CONTEXT* c, std::string authority, const std::string& code)
 {
-    const auto colon = text.find(':');
-    std::string authority = text.substr(0, colon), code = text.substr(colon + 1, text.find('+', colon) - colon - 1);
     for (char& x : authority) x = x >= 'a' && x <= 'z' ? char(x - 'a' + 'A') : x;
-    return Pj(proj_create_from_database(c, authority.c_str(), code.c_str(), PJ_CATEGORY_CRS, 0, nullptr));
+    return Pj(proj_create_from_database(c, authority.c_str(), code.substr(0, code.find('+')).c_str(), PJ_CATEGORY_CRS, 0, nullptr));
 }
 
-/// A number of an authority, a URN, WKT, a PROJ string, PROJJSON; all else PROJ would take for a name, and find a system whose name is like
-/// it.
+/// "EPSG:6670", "urn:ogc:def:crs:EPSG::6670", WKT, a PROJ string, PROJJSON. Each by its own way: what is none of them PROJ would take for
+/// a name, and find a system whose name is like it.
 Pj by_its_form(PJ_CONTEXT* c, const std::string& text)
 {
-    constexpr auto word = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
-    const auto end = text.find_first_not_of(word);
-    const auto next = text.find_first_not_of(blank, end == text.npos ? text.size() : end);
-    const char mark = next == text.npos ? 0 : text[next];
+    const std::string urn = "urn:ogc:def:crs:";
+    const auto colon = text.find(':');
+    if (text.starts_with("{")) return Pj(proj_create(c, text.c_str()));
+    if (text.find_first_of("[(") != text.npos) return Pj(proj_create_from_wkt(c, text.c_str(), nullptr, nullptr, nullptr));
     if (text.find("+proj=") != text.npos) {
         Pj p(proj_create(c, text.c_str()));
         if (!is_crs(p) && text.find("+type=crs") == text.npos) p.reset(proj_create(c, (text + " +type=crs").c_str()));
         return p;
     }
-    if (text.starts_with("urn:ogc:def:crs:") || text.starts_with("{") || (end > 0 && (mark == '[' || mark == '(')))
-        return Pj(proj_create(c, text.c_str()));
-    return mark == ':' && next == end ? by_number(c, text) : Pj();
+    if (text.starts_with(urn) && text.find(':', urn.size()) != text.npos)
+        return by_number(c, text.substr(urn.size(), text.find(':', urn.size()) - urn.size()), text.substr(text.rfind(':') + 1));
+    return colon == text.npos ? Pj() : by_number(c, text.substr(0, colon), text.substr(colon + 1));
 }
 
 std::string newly_read(const std::string& text, const std::string& who)
