@@ -89,9 +89,14 @@ def main():
     check(two["deadline_seconds"] == 120 and 0 < two["ended_seconds"] < 126, "it ends when all that was asked for is done")
     check(two["reach"]["low"] <= two["reach"]["likely"] <= two["reach"]["high"], f"an interval of the reach: {two['reach']}")
     check(any("water" in w for w in two["not_modelled"]) and any("finer" in w for w in two["not_done"]), "it says what is not in it")
+    how = two["discretisation"]
     check(
-        two["discretisation"]["half_width"] is None and "one resolution" in two["discretisation"]["how"],
-        "one resolution gives no interval, and it says so",
+        how["half_width"] == how["front"] > 0 and "one resolution" in how["how"] and "half a particle" in how["how"],
+        f"of one resolution the interval is what half a spacing of thickness moves the front by: {how}",
+    )
+    check(
+        two["reach"]["low"] <= two["reach"]["likely"] - how["front"] and two["reach"]["high"] >= two["reach"]["likely"] + how["front"],
+        "which the reach has on both sides",
     )
     reaches = [m["reach"] for m in two["members"]]
     check(len(set(reaches)) == 6 and min(reaches) > 0.4, f"members differ: {reaches}")
@@ -165,7 +170,11 @@ def main():
     # ---- two resolutions, and real ground with every way of varying it
     call("hazard", heap, "-o", "finer", "--members", "3", "--layers", "2,4", "--within", "120s")
     finer = answer("finer")
-    check(finer["discretisation"]["half_width"] > 0 and "two resolutions" in finer["discretisation"]["how"], f"{finer['discretisation']}")
+    check(
+        finer["discretisation"]["half_width"] >= finer["discretisation"]["front"] > 0
+        and "two resolutions" in finer["discretisation"]["how"],
+        f"{finer['discretisation']}",
+    )
     check(finer["reach"]["low"] < min(m["reach"] for m in finer["members"]), "the interval of resolution widens that of the members")
     shutil.copytree(os.path.join(root, "jobs", "ground"), os.path.join(work, "ground"))
     with open(os.path.join(work, "ground", "slope.toml")) as f:

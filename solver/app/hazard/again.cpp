@@ -33,7 +33,8 @@ Exit answer_again(Base base, const Arguments& args, const std::vector<io::NamedP
     base.coarsest = kept.coarsest;
     auto& all = kept.runs;
     for (auto& r : all)
-        if (r.finished()) r.maps = std::make_shared<const RunMaps>(read_maps(folder / r.directory, base, maps_of_runs(base).wet));
+        if (r.finished())
+            r.maps = std::make_shared<const RunMaps>(read_maps(folder / r.directory, base, maps_of_runs(base).wet, r.spacing));
     if (std::ranges::none_of(all, &Run::finished)) throw BadInput(fmt::format("{}: expected finished runs, found none", file.string()));
     std::error_code error;
     if (!std::filesystem::equivalent(out, folder, error) && std::filesystem::exists(out, error) && !std::filesystem::is_empty(out, error))

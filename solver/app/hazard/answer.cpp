@@ -7,7 +7,6 @@
 namespace kuzure::hazard {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double least_ratio = 1.15; // of two spacings whose answers are compared
 
 } // namespace
@@ -23,7 +22,7 @@ void judge_resolutions(std::vector<study::Sample> samples, Discretisation& d)
     if (samples.size() > 3) samples.erase(samples.begin(), samples.end() - 3);
     const auto [least, most] = std::ranges::minmax_element(samples, {}, &study::Sample::value);
     if (samples.size() < 2) {
-        d.half_width = nan, d.how = "unknown: the likely values were run at one resolution only";
+        d.how = "the likely values were run at one resolution only";
     } else if (samples.size() == 2) {
         d.kind = Discretisation::Difference, d.half_width = most->value - least->value;
         d.how = "the difference of two resolutions; no order of convergence is known from two";
@@ -34,6 +33,10 @@ void judge_resolutions(std::vector<study::Sample> samples, Discretisation& d)
     } else {
         d.kind = Discretisation::Spread, d.half_width = most->value - least->value;
         d.how = fmt::format("the spread of three resolutions: no extrapolation, {}", c.why_not);
+    }
+    if (d.half_width < d.front) {
+        d.half_width = d.front;
+        d.how = "what half a particle's spacing of thickness moves the front by, which is more than the resolutions differ; " + d.how;
     }
 }
 
@@ -69,6 +72,7 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
         samples.push_back({r->spacing, r->maps->reach});
         out.discretisation.samples.push_back({r->layers, r->maps->reach});
     }
+    if (!likely.empty()) out.discretisation.front = likely.back()->maps->front;
     judge_resolutions(std::move(samples), out.discretisation);
 
     std::vector<double> reaches;
@@ -77,7 +81,7 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
     std::sort(sorted.begin(), sorted.end());
     const std::span<const double> s(sorted);
     out.likely = likely.empty() ? quantile(s, 0.5) : likely.back()->maps->reach;
-    const double more = std::isnan(out.discretisation.half_width) ? 0 : out.discretisation.half_width;
+    const double more = out.discretisation.half_width;
     out.low = std::max(0.0, std::min(quantile(s, 0.05), out.likely) - more), out.high = std::max(quantile(s, 0.95), out.likely) + more;
 
     double sum = 0;

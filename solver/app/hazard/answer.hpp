@@ -28,10 +28,11 @@ struct RunMaps {
     std::int64_t column = 0, row = 0, columns = 0, rows = 0;
     std::vector<float> thickness, pressure, arrival; // m, kPa, s; NaN where it did not come
     double reach = 0;                                // m, from the centre of the mass to the farthest point where it was maps.wet thick
+    double front = 0;                                // m, how far half a spacing of thickness more or less moves that point
     double volume = 0;                               // m^3, on the maps at the end
 };
-/// Of a run's directory. Throws BadInput, IoFailed.
-RunMaps read_maps(const io::Path& run, const Base&, double wet);
+/// Of a run's directory, whose particles stand so far apart. Throws BadInput, IoFailed.
+RunMaps read_maps(const io::Path& run, const Base&, double wet, double spacing);
 
 struct Run {
     Part part = Part::Member;
@@ -50,7 +51,8 @@ struct Run {
 /// How much the reach may change with the resolution.
 struct Discretisation {
     enum Kind { Unknown, Difference, Spread, Richardson } kind = Unknown;
-    double half_width = 0;                      // m; NaN: unknown
+    double half_width = 0;                      // m, no less than `front`
+    double front = 0;                           // m: RunMaps::front of the finest run; thinner than that no resolution tells a flow
     double order = 0;                           // observed, of Richardson
     std::string how;                            // in words
     std::vector<std::array<double, 2>> samples; // layers, reach in m

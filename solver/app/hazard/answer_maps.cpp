@@ -173,7 +173,7 @@ std::string number_text(double x) { return std::isnan(x) ? std::string() : fmt::
 
 } // namespace
 
-RunMaps read_maps(const io::Path& run, const Base& base, double wet)
+RunMaps read_maps(const io::Path& run, const Base& base, double wet, double spacing)
 {
     const auto read = [&](const char* name) { return io::read_raster(run / "maps" / name).grid; };
     const auto h = read("h_max.tif"), p = read("p_max.tif"), a = read("t_arrival.tif"), end = read("h_end.tif");
@@ -194,9 +194,16 @@ RunMaps read_maps(const io::Path& run, const Base& base, double wet)
     const scene::Grid thickness = cropped(h, e); // where it counts as reached, for the outline
     if (e.columns == 0) return m;
     const double x = base.scene.map_frame.x + base.centre.x, y = base.scene.map_frame.y + base.centre.y;
-    for (const auto& area : scene::areas_above(thickness, wet * (1 - 1e-6)))
-        for (const auto& ring : area)
-            for (const auto& c : ring) m.reach = std::max(m.reach, std::hypot(c[0] - x, c[1] - y));
+    const auto reach_of = [&](double limit) {
+        double reach = 0;
+        for (const auto& area : scene::areas_above(thickness, limit * (1 - 1e-6)))
+            for (const auto& ring : area)
+                for (const auto& c : ring) reach = std::max(reach, std::hypot(c[0] - x, c[1] - y));
+        return reach;
+    };
+    m.reach = reach_of(wet);
+    // A thickness is a count of particles: what is thinner by half a spacing is the same soil, drawn otherwise.
+    m.front = std::max(m.reach - reach_of(wet + 0.5 * spacing), reach_of(std::max(wet - 0.5 * spacing, 0.1 * wet)) - m.reach);
     return m;
 }
 

@@ -38,7 +38,12 @@ private:
     const char* t(const char* en, const char* ja) const { return ja_ ? ja : en; }
     /// Names of parts differ between the languages.
     std::string id(const char* name) const { return (ja_ ? "ja-" : "en-") + std::string(name); }
-    static std::string metres(double x) { return shown(x) + " m"; }
+    /// Three digits: more would say more than is known.
+    static std::string metres(double x)
+    {
+        const int decimals = x > 0 ? std::clamp(2 - int(std::floor(std::log10(x))), 0, 9) : 0;
+        return fmt::format("{:.{}f} m", x, decimals);
+    }
     static std::string percent(double p) { return fmt::format("{:.0f} %", 100 * p); }
 
     std::string verdict() const
@@ -135,12 +140,19 @@ private:
     std::string sure() const
     {
         const auto& d = a_.discretisation;
-        std::string how, half = std::isnan(d.half_width) ? "" : metres(d.half_width);
-        if (!ja_) how = (half.empty() ? "" : "± " + half + ": ") + d.how + ".";
-        else if (d.kind == Discretisation::Unknown) how = "不明: ひとつの解像度でしか計算していません。";
-        else if (d.kind == Discretisation::Difference) how = "± " + half + ": 二つの解像度の差(収束次数は不明)。";
-        else if (d.kind == Discretisation::Spread) how = "± " + half + ": 三つの解像度のばらつき(単調でないため外挿できません)。";
-        else how = fmt::format("± {}: 三つの解像度からのリチャードソン外挿(次数 {:.2g}、安全率 3)。", half, d.order);
+        std::string how = fmt::format("± {}: {}.", metres(d.half_width), d.how);
+        if (ja_) {
+            const bool front = d.half_width == d.front;
+            how = "± " + metres(d.half_width) + (front ? ": 厚さが粒子間隔の半分だけ変わると先端はこれだけ動きます。" : ": ");
+            if (d.kind == Discretisation::Unknown) how += "ひとつの解像度でしか計算していません。";
+            else if (d.kind == Discretisation::Difference)
+                how += "二つの解像度の差" + std::string(front ? "はこれより小さい" : "") + "(収束次数は不明)。";
+            else if (d.kind == Discretisation::Spread)
+                how += "三つの解像度のばらつき" + std::string(front ? "はこれより小さい" : "") + "(単調でないため外挿できません)。";
+            else
+                how += fmt::format("三つの解像度からのリチャードソン外挿{}(次数 {:.2g}、安全率 3)。", front ? "はこれより小さい" : "",
+                                   d.order);
+        }
         std::string rows;
         for (const auto& [layers, reach] : d.samples) rows += fmt::format("<tr><td>{:.3g}</td><td>{}</td></tr>", layers, metres(reach));
         std::string s = fmt::format("<p><strong>{}</strong> {}</p>\n", t("Resolution:", "解像度:"), escaped(how));

@@ -80,7 +80,7 @@ void Queue::take_what_is_there(Run& r) const
 
 void Queue::finish(Run& r) const
 {
-    r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_of_runs(base_).wet));
+    r.maps = std::make_shared<const RunMaps>(read_maps(out_ / r.directory, base_, maps_of_runs(base_).wet, r.spacing));
     r.status = Status::Finished;
     // Only the results count: a checkpoint of each of many runs would fill the disk.
     std::error_code error;

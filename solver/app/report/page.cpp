@@ -55,7 +55,7 @@ svg .d0{fill:var(--c0)}svg .d1{fill:var(--c1)}svg .d2{fill:var(--c2)}svg .d3{fil
 --c0:#4477aa;--c1:#ee6677;--c2:#228833;--c3:#b8970c;--c4:#2a9fc4;--c5:#aa3377;--c6:#777}
 main{max-width:none;padding:0}body{font-size:11pt}figure,.verdict,.cards,tr{break-inside:avoid}h2{break-after:avoid}
 .bar,.verdict,.cards div,.tag.on,svg{print-color-adjust:exact;-webkit-print-color-adjust:exact}
-pre{white-space:pre-wrap;overflow:visible}details>summary,video{display:none}.pictures{grid-template-columns:1fr 1fr}}
+pre{white-space:pre-wrap;overflow:visible}details>summary,video,section:has(>details:not([open])){display:none}hr{break-after:page;visibility:hidden}.pictures{grid-template-columns:1fr 1fr}}
 )css";
 } // namespace
 
