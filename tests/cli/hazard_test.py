@@ -176,6 +176,11 @@ def main():
         f"{finer['discretisation']}",
     )
     check(finer["reach"]["low"] < min(m["reach"] for m in finer["members"]), "the interval of resolution widens that of the members")
+    differs = [os.path.exists(os.path.join(work, out, "maps", "h_resolution.tif")) for out in ("finer", "early")]
+    check(
+        differs == [True, False] and finer["discretisation"]["thickness"] > 0 and late["discretisation"]["thickness"] is None,
+        f"a map of the thickness between two resolutions, and none of one: {differs}",
+    )
     shutil.copytree(os.path.join(root, "jobs", "ground"), os.path.join(work, "ground"))
     with open(os.path.join(work, "ground", "slope.toml")) as f:
         slope = f.read().replace("end = 10.0", "end = 3.0")

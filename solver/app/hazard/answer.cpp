@@ -74,6 +74,11 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
     }
     if (!likely.empty()) out.discretisation.front = likely.back()->maps->front;
     judge_resolutions(std::move(samples), out.discretisation);
+    for (auto r = likely.rbegin(); r != likely.rend() && out.discretisation.kind != Discretisation::Unknown; ++r)
+        if (r == likely.rbegin() || (*r)->spacing >= least_ratio * likely.back()->spacing) {
+            out.discretisation.finest_two.push_back(*r);
+            if (out.discretisation.finest_two.size() == 2) break;
+        }
 
     std::vector<double> reaches;
     for (const auto* r : out.counted) reaches.push_back(r->maps->reach);

@@ -56,6 +56,8 @@ struct Discretisation {
     double order = 0;                           // observed, of Richardson
     std::string how;                            // in words
     std::vector<std::array<double, 2>> samples; // layers, reach in m
+    std::vector<const Run*> finest_two;         // runs of the likely values, of which samples are compared; or none
+    double thickness = 0;                       // m: root mean square of their difference in greatest thickness, over the cells of either
 };
 struct Sensitivity {
     std::string input;

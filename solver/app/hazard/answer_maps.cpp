@@ -261,14 +261,28 @@ void sum_up(const Base& base, const scene::MapGrid& grid, const std::vector<doub
     });
 }
 
+/// How far the greatest thickness differs between the two finest runs of the likely values.
+void compare_resolutions(const scene::MapGrid& grid, Layers& to, Discretisation& d)
+{
+    Layer l{"h_resolution", {"", "m", "greatest thickness, between two resolutions"}, std::vector<double>(std::size_t(grid.count()), nan)};
+    double squares = 0;
+    std::size_t cells = 0;
+    for_each_cell(d.finest_two, grid, [&](std::int64_t cell, const Cell& c) {
+        const double difference = double(c.thickness[1]) - double(c.thickness[0]);
+        l.values[std::size_t(cell)] = difference, squares += difference * difference, ++cells;
+    });
+    d.thickness = cells > 0 ? std::sqrt(squares / double(cells)) : 0;
+    to.all.push_back(std::move(l));
+}
+
 void write_layers(const Layers& from, const scene::MapGrid& grid, const std::string& crs, const io::Place& folder)
 {
     const auto& layers = from.all;
     // Limits may have changed since an answer before.
     for (const auto& name : io::names_in(folder))
-        if ((name.starts_with("p_h_") || name.starts_with("p_p_")) && std::ranges::none_of(layers, [&](const Layer& l) {
-                return name.starts_with(l.name + ".tif") || name.starts_with(l.name + ".qml");
-            }))
+        if ((name.starts_with("p_h_") || name.starts_with("p_p_") || name.starts_with("h_resolution")) &&
+            std::ranges::none_of(layers,
+                                 [&](const Layer& l) { return name.starts_with(l.name + ".tif") || name.starts_with(l.name + ".qml"); }))
             io::remove_file(folder / name);
     for (const auto& l : layers) {
         double high = 0;
@@ -327,13 +341,17 @@ void write_points(const Answer& answer, const io::Path& directory)
 
 void write_maps(const Base& base, Answer& answer, const std::vector<io::NamedPoint>& points, const io::Path& directory)
 {
-    const auto grid = around(answer.counted);
+    auto all = answer.counted;
+    auto& resolution = answer.discretisation;
+    all.insert(all.end(), resolution.finest_two.begin(), resolution.finest_two.end());
+    const auto grid = around(all);
     const auto& crs = base.scene.map_frame.crs;
     const auto limits = maps_of_runs(base).limits;
     Layers layers = layers_for(base, std::size_t(grid.count()), limits);
     answer.points.clear();
     for (const auto& p : points) answer.points.push_back({p, 0, {nan, nan, nan}, {0, 0, 0}, 0});
     sum_up(base, grid, limits, layers, answer);
+    if (resolution.finest_two.size() == 2) compare_resolutions(grid, layers, resolution);
 
     std::error_code failed;
     std::filesystem::create_directories(directory / "maps", failed);

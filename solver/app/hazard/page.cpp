@@ -158,6 +158,13 @@ private:
         std::string s = fmt::format("<p><strong>{}</strong> {}</p>\n", t("Resolution:", "解像度:"), escaped(how));
         s += fmt::format("<table><thead><tr><th>{}</th><th>{}</th></tr></thead><tbody>{}</tbody></table>\n",
                          t("layers, likely values", "層数(最確値)"), t("reach", "到達距離"), rows);
+        if (!d.finest_two.empty())
+            s += fmt::format("<p><strong>{}</strong> {}</p>\n", t("Thickness:", "厚さ:"),
+                             ja_ ? fmt::format("± {}(最も細かい二つの計算の差の二乗平均平方根。場所ごとの差は maps/h_resolution.tif)。",
+                                               metres(d.thickness))
+                                 : fmt::format("± {}: root mean square of the difference between the two finest runs of the likely values; "
+                                               "place by place in maps/h_resolution.tif.",
+                                               metres(d.thickness)));
         const auto n = a_.counted.size();
         s += fmt::format(
             "<p><strong>{}</strong> {}</p>\n", t("Probabilities:", "確率:"),

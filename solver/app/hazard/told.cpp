@@ -161,6 +161,7 @@ Json to_json(const State& st, const Answer& a)
             {{"half_width", a.discretisation.half_width},
              {"front", a.discretisation.front},
              {"how", a.discretisation.how},
+             {"thickness", a.discretisation.finest_two.empty() ? Json() : Json(a.discretisation.thickness)},
              {"layers_and_reach", a.discretisation.samples}}},
            {"volume", {{"low", a.volume[0]}, {"mean", a.volume[1]}, {"high", a.volume[2]}}},
            {"area", {{"p05", a.area_05}, {"p50", a.area_50}, {"p95", a.area_95}}},
