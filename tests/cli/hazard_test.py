@@ -91,8 +91,8 @@ def main():
     check(any("water" in w for w in two["not_modelled"]) and any("finer" in w for w in two["not_done"]), "it says what is not in it")
     how = two["discretisation"]
     check(
-        how["half_width"] == how["front"] > 0 and "one resolution" in how["how"] and "half a particle" in how["how"],
-        f"of one resolution the interval is what half a spacing of thickness moves the front by: {how}",
+        how["half_width"] == how["front"] > 0 and "one resolution" in how["how"] and "a layer of particles" in how["how"],
+        f"of one resolution the interval is what a layer more or less moves the front by: {how}",
     )
     check(
         two["reach"]["low"] <= two["reach"]["likely"] - how["front"] and two["reach"]["high"] >= two["reach"]["likely"] + how["front"],

@@ -36,7 +36,7 @@ void judge_resolutions(std::vector<study::Sample> samples, Discretisation& d)
     }
     if (d.half_width < d.front) {
         d.half_width = d.front;
-        d.how = "what half a particle's spacing of thickness moves the front by, which is more than the resolutions differ; " + d.how;
+        d.how = "what a layer of particles more or less moves the front by, which is more than the resolutions differ; " + d.how;
     }
 }
 

@@ -28,7 +28,7 @@ struct RunMaps {
     std::int64_t column = 0, row = 0, columns = 0, rows = 0;
     std::vector<float> thickness, pressure, arrival; // m, kPa, s; NaN where it did not come
     double reach = 0;                                // m, from the centre of the mass to the farthest point where it was maps.wet thick
-    double front = 0;                                // m, how far half a spacing of thickness more or less moves that point
+    double front = 0;                                // m, how far a layer of particles more or less moves that point
     double volume = 0;                               // m^3, on the maps at the end
 };
 /// Of a run's directory, whose particles stand so far apart. Throws BadInput, IoFailed.

@@ -143,7 +143,7 @@ private:
         std::string how = fmt::format("± {}: {}.", metres(d.half_width), d.how);
         if (ja_) {
             const bool front = d.half_width == d.front;
-            how = "± " + metres(d.half_width) + (front ? ": 厚さが粒子間隔の半分だけ変わると先端はこれだけ動きます。" : ": ");
+            how = "± " + metres(d.half_width) + (front ? ": 粒子一層分の厚さの増減で先端はこれだけ動きます。" : ": ");
             if (d.kind == Discretisation::Unknown) how += "ひとつの解像度でしか計算していません。";
             else if (d.kind == Discretisation::Difference)
                 how += "二つの解像度の差" + std::string(front ? "はこれより小さい" : "") + "(収束次数は不明)。";
