@@ -119,8 +119,12 @@ Particles settle(const Comm& comm, const Scene& scene, const scene::Filling& fil
     std::optional<Simulation> sim;
     try {
         const double crossing = time_through_height(scene, filling), end = 100 * crossing;
-        sim.emplace(comm, settling_scene(scene, end, false), inner);
-        s.held = !come_to_rest(*sim, options, most, crossing, s);
+        try {
+            sim.emplace(comm, settling_scene(scene, end, false), inner);
+            s.held = !come_to_rest(*sim, options, most, crossing, s);
+        } catch (const NumbersFailed&) { // on its way down a slope that does not carry it
+            s.held = true;
+        }
         if (s.held) {
             sim.emplace(comm, settling_scene(scene, end, true), inner);
             come_to_rest(*sim, options, std::numeric_limits<double>::infinity(), crossing, s);

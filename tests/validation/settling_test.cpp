@@ -113,6 +113,23 @@ TEST(Settling, ASlopeThatDoesNotStandIsHeldUntilItStarts)
     EXPECT_GT(peak_speed(sim), 0.5);
 }
 
+TEST(Settling, SoilThatFailsOnItsWayDownIsHeld)
+{
+    RunOptions options;
+    int failures = 0;
+    options.settling = [&](const Settling& s) {
+        if (s.steps == 5 && failures++ == 0) throw NumbersFailed("a wall gave energy");
+        return false;
+    };
+    Simulation sim(Comm::world(), bank(5, "cohesion = 1.0e4\nfriction_angle = 25.0").scene(), options);
+    ASSERT_TRUE(sim.settled().has_value());
+    EXPECT_TRUE(sim.settled()->held);
+    EXPECT_TRUE(sim.settled()->at_rest);
+    // What fails while it is held fails.
+    options.settling = [](const Settling& s) -> bool { return s.steps % 5 == 0 ? throw NumbersFailed("a wall gave energy") : false; };
+    EXPECT_THROW(Simulation(Comm::world(), bank(5, "cohesion = 1.0e4").scene(), options), NumbersFailed);
+}
+
 TEST(Settling, BodiesThatAreNotAtRestStayAsTheSceneDrawsThem)
 {
     SceneText t = bank(5, "cohesion = 1.0e4\nfriction_angle = 25.0");
