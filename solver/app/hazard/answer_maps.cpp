@@ -202,8 +202,9 @@ RunMaps read_maps(const io::Path& run, const Base& base, double wet, double spac
         return reach;
     };
     m.reach = reach_of(wet);
-    // A thickness is a count of particles, and flow that is a layer or two of them deep is hardly resolved.
-    m.front = std::max(m.reach - reach_of(wet + spacing), reach_of(std::max(wet - spacing, 0.1 * wet)) - m.reach);
+    // A thickness is a count of particles, and flow that is a layer or two of them deep is hardly resolved. By the slope of the front: half
+    // a layer either way, twice.
+    m.front = 2 * std::max(m.reach - reach_of(wet + 0.5 * spacing), reach_of(std::max(wet - 0.5 * spacing, 0.1 * wet)) - m.reach);
     return m;
 }
 
