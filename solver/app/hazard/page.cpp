@@ -38,7 +38,12 @@ private:
     const char* t(const char* en, const char* ja) const { return ja_ ? ja : en; }
     /// Names of parts differ between the languages.
     std::string id(const char* name) const { return (ja_ ? "ja-" : "en-") + std::string(name); }
-    /// Three digits: more would say more than is known.
+    /// Three digits, of areas and volumes too: more would say more than is known.
+    static std::string rounded(double x)
+    {
+        const double unit = x > 0 ? std::pow(10, std::floor(std::log10(x)) - 2) : 1;
+        return unit < 1 ? shown(x) : report::grouped(std::round(x / unit) * unit);
+    }
     static std::string metres(double x)
     {
         const int decimals = x > 0 ? std::clamp(2 - int(std::floor(std::log10(x))), 0, 9) : 0;
@@ -80,10 +85,10 @@ private:
         s += card(t("layers of particles", "粒子の層数"),
                   most > least * 1.01 ? fmt::format("{:.3g} – {:.3g}", least, most) : fmt::format("{:.3g}", most),
                   t("over the mean thickness", "平均厚さあたり"));
-        s += card(t("volume", "土量"), fmt::format("{} m³", shown(a_.volume[1])),
-                  a_.volume[2] > a_.volume[0] * 1.001 ? fmt::format("{} – {} m³", shown(a_.volume[0]), shown(a_.volume[2])) : "");
-        s += card(t("reached by 5 % or more", "5 %以上の確率で到達"), fmt::format("{} m²", report::grouped(std::round(a_.area_05))));
-        s += card(t("reached by 95 % or more", "95 %以上の確率で到達"), fmt::format("{} m²", report::grouped(std::round(a_.area_95))));
+        s += card(t("volume", "土量"), fmt::format("{} m³", rounded(a_.volume[1])),
+                  a_.volume[2] > a_.volume[0] * 1.001 ? fmt::format("{} – {} m³", rounded(a_.volume[0]), rounded(a_.volume[2])) : "");
+        s += card(t("reached by 5 % or more", "5 %以上の確率で到達"), fmt::format("{} m²", rounded(a_.area_05)));
+        s += card(t("reached by 95 % or more", "95 %以上の確率で到達"), fmt::format("{} m²", rounded(a_.area_95)));
         if (s_.deadline > 0)
             s += card(t("answered after", "計算時間"), report::duration(s_.ended),
                       ja_ ? fmt::format("期限 {}", report::duration(s_.deadline)) : fmt::format("of {}", report::duration(s_.deadline)));
