@@ -38,17 +38,14 @@ private:
     const char* t(const char* en, const char* ja) const { return ja_ ? ja : en; }
     /// Names of parts differ between the languages.
     std::string id(const char* name) const { return (ja_ ? "ja-" : "en-") + std::string(name); }
-    /// Three digits, of areas and volumes too: more would say more than is known.
+    /// Three digits: more would say more than is known.
     static std::string rounded(double x)
     {
-        const double unit = x > 0 ? std::pow(10, std::floor(std::log10(x)) - 2) : 1;
-        return unit < 1 ? shown(x) : report::grouped(std::round(x / unit) * unit);
+        const int digits = x > 0 ? 2 - int(std::floor(std::log10(x))) : 0; // behind the point
+        const double unit = std::pow(10, -digits);
+        return digits < 0 ? report::grouped(std::round(x / unit) * unit) : fmt::format("{:.{}f}", x, std::min(digits, 9));
     }
-    static std::string metres(double x)
-    {
-        const int decimals = x > 0 ? std::clamp(2 - int(std::floor(std::log10(x))), 0, 9) : 0;
-        return fmt::format("{:.{}f} m", x, decimals);
-    }
+    static std::string metres(double x) { return rounded(x) + " m"; }
     static std::string percent(double p) { return fmt::format("{:.0f} %", 100 * p); }
 
     std::string verdict() const
