@@ -2,6 +2,7 @@
 #include "io/file.hpp"
 #include "io/keys.hpp"
 #include "io/quote.hpp"
+#include "io/trim.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <fmt/format.h>
@@ -14,12 +15,6 @@ namespace {
 constexpr std::string_view ending = ".job.sh";
 constexpr int deepest_include = 8;
 constexpr std::uint64_t most_bytes = 1 << 20;
-
-std::string trimmed(const std::string& s)
-{
-    const auto first = s.find_first_not_of(" \t"), last = s.find_last_not_of(" \t");
-    return first == s.npos ? "" : s.substr(first, last - first + 1);
-}
 
 class Filler {
 public:
@@ -45,12 +40,12 @@ public:
                 if (open.empty()) wrong("{{end}}", "expected {{if NAME}} before it, found none; remove it");
                 open.pop_back();
             } else if (word.starts_with("if ")) {
-                std::string name = trimmed(word.substr(3));
+                std::string name = trimmed(word.substr(3), in_a_line);
                 const bool negated = name.starts_with("not ");
-                if (negated) name = trimmed(name.substr(4));
+                if (negated) name = trimmed(name.substr(4), in_a_line);
                 open.push_back({at_.line, has(name) != negated});
             } else if (word.starts_with("include ")) {
-                const std::string name = trimmed(word.substr(8));
+                const std::string name = trimmed(word.substr(8), in_a_line);
                 // Beside the template that asks first: parts of a site's own.
                 std::vector<std::filesystem::path> where{file.parent_path()};
                 where.insert(where.end(), folders_.begin(), folders_.end());

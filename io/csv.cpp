@@ -1,4 +1,5 @@
 #include "io/csv.hpp"
+#include "io/trim.hpp"
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -23,10 +24,7 @@ std::optional<std::vector<std::string>> cells_of(std::string_view line, char sep
         else cells.back() += c;
     }
     if (quoted) return {};
-    for (auto& c : cells) {
-        const auto first = c.find_first_not_of(" \t"), last = c.find_last_not_of(" \t");
-        c = first == c.npos ? std::string() : c.substr(first, last - first + 1);
-    }
+    for (auto& c : cells) c = trimmed(c, in_a_line);
     return cells;
 }
 

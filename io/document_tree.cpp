@@ -1,6 +1,7 @@
 // The file as a tree: its bytes, the line of every key, --set. What its values must be: document.cpp.
 #include "io/document.hpp"
 #include "io/quote.hpp"
+#include "io/trim.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
@@ -209,13 +210,7 @@ void Document::override_with(const std::string& set)
     refuse_bad_bytes(set, [&](std::size_t) { return std::string("--set"); });
     refuse_deep_keys(set, [&](std::size_t) { return std::string("--set"); });
     const auto equals = set.find('=');
-    const auto trim = [](std::string s) {
-        const char* blank = " \t\r\n";
-        s.erase(0, std::min(s.find_first_not_of(blank), s.size()));
-        s.erase(s.find_last_not_of(blank) + 1);
-        return s;
-    };
-    const std::string path = trim(set.substr(0, equals)), value = equals == set.npos ? "" : trim(set.substr(equals + 1));
+    const std::string path = trimmed(set.substr(0, equals)), value = equals == set.npos ? "" : trimmed(set.substr(equals + 1));
     const auto parts = split(path);
     if (equals == set.npos || value.empty() || std::any_of(parts.begin(), parts.end(), [](const auto& p) { return p.empty(); }))
         throw BadInput(location + ": expected key.path=value, for example --set space.spacing=0.02");

@@ -1,4 +1,5 @@
 #include "io/ground/crs.hpp"
+#include "io/trim.hpp"
 #include "solver/core/ensure.hpp"
 #include <algorithm>
 #include <cmath>
@@ -118,15 +119,6 @@ bool geographic(const Pj& p)
     return type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
 }
 
-constexpr auto blank = " \t\r\n";
-
-/// What stands between blanks; PROJ would keep those behind a number as part of it.
-std::string trimmed(const std::string& text)
-{
-    const auto first = text.find_first_not_of(blank);
-    return first == text.npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
-}
-
 /// A number of an authority, the number of a system of heights behind a plus left out.
 Pj by_number(PJ_CONTEXT* c, std::string authority, const std::string& code)
 {
@@ -174,7 +166,7 @@ std::string newly_read(const std::string& text, const std::string& who)
 
 std::string crs_from(const std::string& given, const std::string& who)
 {
-    const auto text = trimmed(given);
+    const auto text = trimmed(given); // PROJ would keep a line's end behind a number as part of it
     // Each of hundreds of tiles names the one system of them all.
     thread_local std::map<std::string, std::string> already_read;
     if (const auto found = already_read.find(text); found != already_read.end()) return found->second;

@@ -3,6 +3,7 @@
 #if KUZURE_TERRAIN
 #include "io/ground/crs.hpp"
 #include "io/ground/text.hpp"
+#include "io/trim.hpp"
 #include <algorithm>
 #include <archive.h>
 #include <archive_entry.h>
@@ -50,12 +51,6 @@ std::array<double, 2> two(const pugi::xml_node& in, const char* name, const std:
         from = next;
     }
     return v;
-}
-
-std::string trimmed(std::string_view s)
-{
-    const auto from = s.find_first_not_of(" \t\r\n"), to = s.find_last_not_of(" \t\r\n");
-    return from == s.npos ? "" : std::string(s.substr(from, to + 1 - from));
 }
 
 std::string crs_of(const pugi::xml_node& coverage, const std::string& file)

@@ -13,13 +13,17 @@ constexpr double least_ratio = 1.15; // of two spacings whose answers are compar
 
 namespace {
 
-/// The error of resolution, from the likely values at several of them.
-void judge_resolutions(std::vector<study::Sample> samples, Discretisation& d)
+/// The error of resolution, from finished runs of the likely values, the coarsest first.
+void judge_resolutions(std::vector<const Run*> runs, Discretisation& d)
 {
+    if (!runs.empty()) d.front = runs.back()->maps->front;
     // Neighbours that are nearly alike say nothing of an order: the finest of them counts; and the three finest tell most.
-    for (std::size_t k = samples.size(); k > 1; --k)
-        if (samples[k - 2].spacing < least_ratio * samples[k - 1].spacing) samples.erase(samples.begin() + std::ptrdiff_t(k) - 2);
-    if (samples.size() > 3) samples.erase(samples.begin(), samples.end() - 3);
+    for (std::size_t k = runs.size(); k > 1; --k)
+        if (runs[k - 2]->spacing < least_ratio * runs[k - 1]->spacing) runs.erase(runs.begin() + std::ptrdiff_t(k) - 2);
+    if (runs.size() > 3) runs.erase(runs.begin(), runs.end() - 3);
+    if (runs.size() >= 2) d.finest_two.assign(runs.end() - 2, runs.end());
+    std::vector<study::Sample> samples;
+    for (const auto* r : runs) samples.push_back({r->spacing, r->maps->reach});
     const auto [least, most] = std::ranges::minmax_element(samples, {}, &study::Sample::value);
     if (samples.size() < 2) {
         d.how = "the likely values were run at one resolution only";
@@ -66,19 +70,11 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
     if (out.preliminary) out.counted = likely;
     out.counted.insert(out.counted.end(), members.begin(), members.end());
 
-    std::vector<study::Sample> samples;
-    for (const auto* r : likely) {
-        if (!samples.empty() && samples.back().spacing == r->spacing) continue; // the same run under two names
-        samples.push_back({r->spacing, r->maps->reach});
-        out.discretisation.samples.push_back({r->layers, r->maps->reach});
-    }
-    if (!likely.empty()) out.discretisation.front = likely.back()->maps->front;
-    judge_resolutions(std::move(samples), out.discretisation);
-    for (auto r = likely.rbegin(); r != likely.rend() && out.discretisation.kind != Discretisation::Unknown; ++r)
-        if (r == likely.rbegin() || (*r)->spacing >= least_ratio * likely.back()->spacing) {
-            out.discretisation.finest_two.push_back(*r);
-            if (out.discretisation.finest_two.size() == 2) break;
-        }
+    auto resolutions = likely;
+    const auto repeated = std::ranges::unique(resolutions, {}, [](const Run* r) { return r->spacing; }); // the same run under two names
+    resolutions.erase(repeated.begin(), repeated.end());
+    for (const auto* r : resolutions) out.discretisation.samples.push_back({r->layers, r->maps->reach});
+    judge_resolutions(std::move(resolutions), out.discretisation);
 
     std::vector<double> reaches;
     for (const auto* r : out.counted) reaches.push_back(r->maps->reach);

@@ -19,7 +19,6 @@ namespace {
 
 constexpr const char* mark = "fit_plan.json";
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double start_seconds = 1.0; // s, at most, of a run before its first step
 /// Times the layers of the best run, for particles at other positions: enough to move all of them, too few for another answer.
 constexpr std::array repeat_layers{1.08, 1.17};
 /// Below it soil is recorded too, so that outlines can be drawn through the cells in between.
@@ -174,8 +173,8 @@ private:
         queue_->work({&r}, 1, cores_, 0);
         spacing_ = coarse;
         if (!r.finished()) return;
-        const double start = std::min(start_seconds, 0.7 * r.seconds);
-        const Cost cost{start / std::min(jobs_, cores_), std::max(1e-3, r.seconds - start), r.layers};
+        Cost cost = measured_cost(r.seconds, r.layers);
+        cost.start /= std::min(jobs_, cores_);
         double layers = r.layers;
         while (layers < base_.layers_of(own) && usual_runs() * cost.seconds(layers + 0.1) < 0.8 * left()) layers += 0.1;
         if (layers >= 0.97 * base_.layers_of(own)) spacing_ = own;

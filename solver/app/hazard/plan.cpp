@@ -23,6 +23,13 @@ double rounded(double layers) { return std::floor(10 * layers + 1e-9) / 10; }
 
 } // namespace
 
+Cost measured_cost(double seconds, double layers)
+{
+    constexpr double most_start = 1.0; // s, of a run before its first step: reading, forecast
+    const double start = std::min(most_start, 0.7 * seconds);
+    return {start, std::max(1e-3, seconds - start), layers};
+}
+
 double Cost::seconds(double at) const { return start + steps * std::pow(at / layers, cost_power); }
 
 Plan make_plan(const Cost& c, double left, int members, double layers)

@@ -5,7 +5,7 @@
 namespace kuzure::hazard {
 
 /// Pairs of a whole run go with this power of the layers: particles with the third, steps with the first, and the more layers, the fewer
-/// particles are at the surface, where neighbours are missing (measured: 4.15 to 4.25, docs/hazard.md).
+/// particles are at the surface, where neighbours are missing (measured: 4.06 to 4.25, docs/hazard.md).
 inline constexpr double cost_power = 4.25;
 
 /// Seconds of a run with all cores of the machine: what it takes before its first step, and its steps.
@@ -13,6 +13,9 @@ struct Cost {
     double start = 0, steps = 0, layers = 4; // s, s, at so many layers
     double seconds(double at_layers) const;
 };
+
+/// By a run that took so many s.
+Cost measured_cost(double seconds, double layers);
 
 struct Plan {
     int members = 0;

@@ -15,8 +15,6 @@
 namespace kuzure::hazard {
 namespace {
 
-constexpr double start_seconds = 1.0; // s, at most, of a run before its first step: reading, forecast
-
 class Hazard {
 public:
     Hazard(const Comm& comm, const Arguments& a)
@@ -78,7 +76,7 @@ public:
         queue_->work({&first}, 1, cores_, 0);
         if (first.status == Status::Refused)
             throw BadInput(fmt::format("the scene was refused at {:.3g} layers: {}", first.layers, first.message));
-        cost_ = cost_of(first);
+        cost_ = measured_cost(first.seconds, first.layers);
         publish(false);
 
         const Plan plan = plan_ensemble();
@@ -149,13 +147,6 @@ private:
     }
 
     // ---- what is run
-
-    /// Of a run with all cores.
-    Cost cost_of(const Run& r) const
-    {
-        const double start = std::min(start_seconds, 0.7 * r.seconds);
-        return {start, std::max(1e-3, r.seconds - start), r.layers};
-    }
 
     Plan plan_ensemble()
     {
@@ -229,8 +220,8 @@ private:
         for (const auto* r : todo)
             if (r->finished()) sum += r->seconds, ++n;
         if (n > 0) {
-            const double start = std::min(start_seconds, 0.7 * sum / n);
-            cost_ = {start, std::max(1e-3, (sum / n - start) / std::min(jobs_, cores_)), base_.layers_of(spacing)};
+            cost_ = measured_cost(sum / n, base_.layers_of(spacing));
+            cost_.steps = std::max(1e-3, cost_.steps / std::min(jobs_, cores_));
         }
     }
 
@@ -269,7 +260,7 @@ private:
         say(fmt::format("finer: the likely values with {:.3g} layers, about {}", r.layers, seconds_text(expected)));
         queue_->work({&r}, 1, cores_, layers_.given ? 0 : std::min(expected, 0.98 * left()));
         if (!r.finished()) return false;
-        cost_ = cost_of(r);
+        cost_ = measured_cost(r.seconds, r.layers);
         if (!over()) publish(false);
         return true;
     }
