@@ -135,7 +135,7 @@ template <class A> void describe_terrain(A& a, std::optional<scene::Terrain>& te
                a.choice(p + ".edge", t.edge, {{"open", scene::Edge::Open}, {"closed", scene::Edge::Closed}},
                         {.fallback = "\"open\"",
                          .example = "\"closed\"",
-                         .doc = "\"open\": soil that leaves the ground falls and is counted; \"closed\": it ends the run (exit 3)"});
+                         .doc = "\"open\": soil that leaves the ground is counted and taken out; \"closed\": it ends the run (exit 3)"});
                a.choice(p + ".lattice", t.lattice, {{"draped", scene::GroundLattice::Draped}, {"plain", scene::GroundLattice::Plain}},
                         {.fallback = "\"draped\"",
                          .example = "\"plain\"",

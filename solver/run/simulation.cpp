@@ -120,6 +120,7 @@ void Simulation::prepare()
 Requests Simulation::step(Requests mine)
 {
     begin_events();
+    take_out_what_left();
     const double dt = next_dt();
     ensure(dt > 0, "a finished run was asked for another step");
     if (!last_good_) remember(); // the start of the run, or of its restart
@@ -366,8 +367,8 @@ double Simulation::residual(const Ledger& l) const
     if (clock_.step == 0) return 0; // the ledger begins here; what it began with has the half kick to come before it
     const double excess = l.sum() - clock_.energy_at_start;
     double drop = -l.state.potential;
-    // After an event the potential may be that of other soil or gravity.
-    if (clock_.events > 0)
+    // After an event the potential may be that of other soil or gravity, or some of the soil has left.
+    if (clock_.events > 0 || clock_.taken != 0)
         drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.events), std::fabs(l.dissipated.moved_wall),
                          std::fabs(clock_.energy_at_start)});
     if (!scene_.loads.empty()) drop = std::max({drop, l.state.kinetic, l.state.elastic, std::fabs(l.dissipated.loads)});

@@ -126,6 +126,8 @@ private:
     void begin_loads(const Scene& before);
     /// Throws NumbersFailed where a wall or body came to stand in soil. Collective.
     void require_room(const Scene& before);
+    /// Soil that has left real ground is taken out of the run: else it falls without end, ever faster. Collective.
+    void take_out_what_left();
     /// What changes little by little takes its values of the end of a step; gives the scene before, where something does. Collective.
     std::optional<Scene> follow_courses(double dt);
     void end_course(const Scene& before);

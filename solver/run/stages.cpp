@@ -3,6 +3,7 @@
 #include "solver/run/simulation.hpp"
 #include "solver/run/start.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/shape.hpp"
 #include <fmt/format.h>
@@ -35,6 +36,22 @@ void Simulation::begin_events()
     const double taken = before - ledger(clock_.next).sum(); // with the half kick to come before it, as at the start
     take(taken);
     for (const int k : news) happened_.push_back({k, clock_.time, clock_.step, taken});
+}
+
+void Simulation::take_out_what_left()
+{
+    constexpr std::int64_t interval = 64; // steps
+    if (!scene_.terrain || clock_.step == 0 || clock_.step % interval != 0) return;
+    std::vector<Index> stay;
+    for (Index i = 0; i < particles_.size(); ++i)
+        if (!scene::has_left(scene_, std::as_const(particles_)[field::position][i])) stay.push_back(i);
+    if (comm_.max(std::int64_t(particles_.size()) - std::int64_t(stay.size())) == 0) return;
+    const double before = ledger(clock_.dt).sum();
+    particles_.gather(stay);
+    layout_.forget();
+    if (model_->moves_first()) evaluate_anew();
+    else rebuild(true, clock_.time);
+    take(before - ledger(clock_.next).sum());
 }
 
 void Simulation::enter_stage(double time)

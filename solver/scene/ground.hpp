@@ -11,4 +11,8 @@ inline const HeightField* ground_of(const Scene& s)
     return nullptr;
 }
 
+/// True where soil at x (m) has left real ground for good, in a scene whose ground lets it: no ground below it nor, within two supports,
+/// beside it, and no other wall below it.
+bool has_left(const Scene&, Vector x);
+
 } // namespace kuzure::scene

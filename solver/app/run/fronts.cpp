@@ -1,4 +1,5 @@
 #include "solver/app/run/fronts.hpp"
+#include "solver/scene/events.hpp"
 #include "solver/scene/numbers.hpp"
 #include <algorithm>
 #include <limits>
@@ -14,8 +15,8 @@ struct Column {
     double top; // m, highest particle centre
 };
 
-/// Share of all soil that is below the lowest wall or beyond the outermost ones.
-double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, std::int64_t soil)
+/// Share of all soil that is below the lowest wall or beyond the outermost ones, or was taken out of the run when it had been there.
+double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
 {
     if (s.walls.empty()) return 0;
     const auto x = p[field::position];
@@ -27,13 +28,14 @@ double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, st
     }
     // Along a period nothing is beyond anything.
     const bool along_x = !s.space.periodic[0], along_y = s.dimensions == 3 && !s.space.periodic[1], along_z = !s.space.periodic[2];
-    std::int64_t left = 0;
+    std::int64_t left = -std::int64_t(p.size());
     for (Index i = 0; i < p.size(); ++i) {
         const Vector a = x[i];
         left += (along_x && (a.x < all.low.x || a.x > all.high.x)) || (along_y && (a.y < all.low.y || a.y > all.high.y)) ||
                 (along_z && a.z < all.low.z);
     }
-    return double(comm.sum(left)) / double(std::max<std::int64_t>(1, soil));
+    const double gone = double(comm.sum(left) + scene::soil_present(s, filling));
+    return gone / double(std::max<std::int64_t>(1, filling.soil_count()));
 }
 } // namespace
 
@@ -87,7 +89,7 @@ Fronts measure_fronts(const Comm& comm, const Particles& p, const Scene& s, cons
         e[3] = std::max(e[3], -(corner.y + c.y * dx)), e[4] = std::max(e[4], corner.y + (c.y + 1) * dx);
     }
     comm.max(std::span<double>(e));
-    const double off = share_off_ground(comm, p, s, filling.soil_count());
+    const double off = share_off_ground(comm, p, s, filling);
     if (e[0] < -1e299) return {.off_ground = off};
     if (s.dimensions == 2) e[3] = e[4] = 0;
     return {e[0], -e[1], e[2], -e[3], e[4], off};

@@ -99,13 +99,15 @@ void require_sound_state(const Comm& comm, const io::Checkpoint& from, const Par
         refuse(fmt::format("{} events have begun in it, the scene has {}", clock.events, scene.events.size()));
     const Scene stage = scene::stage_of(scene, clock.events, clock.time);
     const std::int64_t present = scene::soil_present(stage, filling);
-    if (from.particles != present) refuse(fmt::format("it holds {} particles, the scene has {}", from.particles, present));
+    // Soil that has left real ground is taken out.
+    if (scene.terrain ? from.particles > present : from.particles != present)
+        refuse(fmt::format("it holds {} particles, the scene has {}", from.particles, present));
     auto fault = first_fault(p, scene, count);
     for (Index i = 0; i < p.size() && fault.empty(); ++i)
         if (const int body = filling.body_of(p[field::id][i]); !stage.bodies[std::size_t(body)].present)
             fault = fmt::format("particle {} is of {}, which is not there then", p[field::id][i], scene::name_of_body(scene, body));
     refuse(fault);
-    // So many, in range and none twice: each is there.
+    // So many, in range and none twice: each is there, or has left.
     const auto twice = doubled(comm, p, count);
     refuse(twice < 0 ? "" : fmt::format("id {} is there twice", twice));
 }
