@@ -131,7 +131,19 @@ template <class A> void describe_terrain(A& a, std::optional<scene::Terrain>& te
                         .range = {.low = 0, .high = 90, .low_open = true, .high_open = true},
                         .optional = true,
                         .example = "24.0",
-                        .doc = "Coulomb friction of the ground; needed unless surface is \"rough\" or \"smooth\""});
+                        .doc = "Coulomb friction of the ground; needed unless surface is \"rough\" or \"smooth\", or friction_map says it "
+                               "everywhere"});
+               a.text(p + ".friction_map", t.friction_map,
+                      {.optional = true,
+                       .example = "\"friction.tif\"",
+                       .doc = "raster of such angles in degrees; where it has none friction counts",
+                       .role = Role::Bookkeeping});
+               a.number(p + ".xi", t.xi,
+                        {.unit = "m/s^2",
+                         .range = above_to(0, 1e6),
+                         .optional = true,
+                         .example = "500.0",
+                         .doc = "Voellmy's drag: beside Coulomb's friction a traction of rho g v^2/xi; without it none"});
                a.choice(p + ".edge", t.edge, {{"open", scene::Edge::Open}, {"closed", scene::Edge::Closed}},
                         {.fallback = "\"open\"",
                          .example = "\"closed\"",

@@ -286,8 +286,10 @@ scene::CheckedScene parse_checked_scene(std::string_view text, const std::string
     }
     file.throw_if_any();
     if (scene.maps) absolute(scene.maps->points);
-    if (scene.terrain)
+    if (scene.terrain) {
         for (auto& dem : scene.terrain->dem) absolute(dem);
+        absolute(scene.terrain->friction_map);
+    }
     for (auto& body : scene.bodies)
         if (auto* r = std::get_if<scene::Release>(&body.shape))
             for (auto* path : {&r->outline, &r->thickness_map, &r->surface, &r->before, &r->after}) absolute(*path);

@@ -242,7 +242,10 @@ private:
 void write_ground(const Scene& scene, std::string& out)
 {
     for (const auto& wall : scene.walls)
-        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) out += fmt::format("terrain.heights = {}\n", digest(g->field->grid()));
+        if (const auto* g = std::get_if<scene::Ground>(&wall.shape)) {
+            out += fmt::format("terrain.heights = {}\n", digest(g->field->grid()));
+            if (g->friction) out += fmt::format("terrain.frictions = {}\n", digest(*g->friction));
+        }
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const auto* r = std::get_if<scene::Release>(&scene.bodies[b].shape);
         if (!r) continue;

@@ -52,12 +52,17 @@ private:
     {
         if (!has_terrain()) throw Refused{"terrain", built_without_maps};
         if (scene_.dimensions != 3) throw Refused{"terrain", "expected dimensions = 3 on real ground, found 2. Remedy: dimensions = 3"};
-        if (terrain_.surface == scene::Surface::Coulomb && terrain_.friction_angle == 0)
+        if (terrain_.surface == scene::Surface::Coulomb && terrain_.friction_angle == 0 && terrain_.friction_map.empty())
             throw Refused{"terrain.friction",
                           "expected the friction angle between soil and ground in degrees, found none. Remedy: friction = 24.0, or "
                           "surface = \"rough\" or \"smooth\""};
-        if (terrain_.surface != scene::Surface::Coulomb && terrain_.friction_angle != 0)
-            throw Refused{"terrain.friction", "expected no angle beside a rough or smooth surface. Remedy: leave friction out, or surface"};
+        if (terrain_.surface != scene::Surface::Coulomb)
+            for (const auto& [key, there] : {std::pair("friction", terrain_.friction_angle != 0),
+                                             {"friction_map", !terrain_.friction_map.empty()},
+                                             {"xi", terrain_.xi.has_value()}})
+                if (there)
+                    throw Refused{fmt::format("terrain.{}", key),
+                                  fmt::format("expected none beside a rough or smooth surface. Remedy: leave {} out, or surface", key)};
         if (terrain_.dem.empty()) throw Refused{"terrain.dem", "expected the file of an elevation model, or several, found none"};
         if (const auto& w = terrain_.window; w && !((*w)[0] < (*w)[2] && (*w)[1] < (*w)[3]))
             throw Refused{"terrain.window",
@@ -291,8 +296,45 @@ private:
             m.release->thicknesses = std::make_shared<const scene::Grid>(local(std::move(t)));
         }
         std::erase_if(scene_.walls, [](const scene::Wall& wall) { return std::holds_alternative<scene::Ground>(wall.shape); });
-        scene_.walls.push_back({scene::Ground{field, scene::ground_depth(*field, scene_.support()), terrain_.lattice}, terrain_.surface,
-                                terrain_.friction_angle});
+        const auto friction = read_friction();
+        const double drag = terrain_.xi ? 9.81 / *terrain_.xi : 0;
+        scene::Ground ground{field, scene::ground_depth(*field, scene_.support()), terrain_.lattice,
+                             friction ? std::make_shared<const scene::Grid>(local(*friction)) : nullptr};
+        const double angle = friction && terrain_.friction_angle == 0 ? mean_of(*friction) : terrain_.friction_angle;
+        scene_.walls.push_back({.shape = std::move(ground), .surface = terrain_.surface, .friction_angle = angle, .drag = drag});
+    }
+
+    static double mean_of(const scene::Grid& g)
+    {
+        double sum = 0;
+        std::size_t n = 0;
+        for (const double v : g.values)
+            if (!std::isnan(v)) sum += v, ++n;
+        return sum / double(std::max<std::size_t>(1, n));
+    }
+    /// The raster of friction on the cells of the ground, rad; `friction` where it has none.
+    std::optional<scene::Grid> read_friction() const
+    {
+        if (terrain_.friction_map.empty()) return {};
+        const auto degrees = at_key("terrain.friction_map", [&] { return onto(terrain_.friction_map, dem_, crs_); });
+        scene::Grid angles = dem_;
+        dem_.for_each([&](int i, int j, std::size_t k) {
+            const double d = degrees[k];
+            if (std::isnan(d) && !std::isnan(dem_.values[k]) && terrain_.friction_angle == 0)
+                throw Refused{
+                    "terrain.friction_map",
+                    fmt::format("{}: no data at {}, and no friction to count there. Remedy: friction = 24.0 beside it, or a raster "
+                                "that covers the ground",
+                                terrain_.friction_map, cell_text(dem_, i, j))};
+            if (d <= 0 || d >= 90)
+                throw Refused{
+                    "terrain.friction_map",
+                    fmt::format("{}: expected friction angles above 0 and below 90 degrees, found {} at {}. Remedy: gdal_calc.py, "
+                                "or declare it no data: gdal_translate -a_nodata {}",
+                                terrain_.friction_map, d, cell_text(dem_, i, j), d)};
+            angles.values[k] = std::isnan(d) ? terrain_.friction_angle : d * (std::numbers::pi / 180);
+        });
+        return angles;
     }
 
     Scene& scene_;

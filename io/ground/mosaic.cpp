@@ -61,7 +61,8 @@ scene::Grid around(const scene::Grid& a, const scene::Grid& b)
     return g;
 }
 
-double bilinear(const scene::Grid& g, double x, double y)
+/// Bilinear to single precision; on a point of the grid, but for round-off, its own number.
+double resampled(const scene::Grid& g, double x, double y)
 {
     double u = (x - g.x) / g.cell, v = (y - g.y) / g.cell;
     // On a point but for round-off: that point.
@@ -100,7 +101,7 @@ void sample(const Raster& from, scene::Grid& to, const std::string& crs)
             if (!std::isnan(there)) continue;
             const double x = to.x + i * to.cell, y = to.y + j * to.cell;
             const auto p = way ? way->back(x, y) : std::array<double, 2>{x, y};
-            there = bilinear(source, p[0], p[1]);
+            there = resampled(source, p[0], p[1]);
         }
 }
 

@@ -21,6 +21,7 @@ protected:
         S limit;                // sum f tan(delta) n.(sigma_i grad W)
         S approach;             // sum f (n.v_i)(n.grad W) of Coulomb faces
         Vec3<S> area;           // sum f (n.grad W) n of Coulomb faces
+        S dragging;             // sum f drag n.grad W of these
         S nearest, sunk, grip;  // square of the distance to the nearest wall point; how far behind its face; tan(delta) there
         Vec3<S> out;            // that face's normal
     };
@@ -184,7 +185,7 @@ private:
                 power.facing = power.facing + facing;
             }
             sums.approach = fma(facing, dot(relative, m.normal), sums.approach);
-            sums.area = fma(facing, m.normal, sums.area);
+            sums.area = fma(facing, m.normal, sums.area), sums.dragging = fma(facing, m.drag, sums.dragging);
             const auto nearer = less(r2, sums.nearest);
             sums.nearest = min(sums.nearest, r2), sums.sunk = select(nearer, m.sunk, sums.sunk);
             sums.grip = select(nearer, slides * m.tangent, sums.grip);
@@ -396,7 +397,11 @@ private:
                 carried_next = share * Vector{at(power.carried_next.x, k), at(power.carried_next.y, k), at(power.carried_next.z, k)};
             }
             // a spring of the soil's own shear stiffness across half a smoothing length
-            const auto f = return_to_coulomb(slip[i], in.dt * (v[i] - carried), (1 / area) * faces, most, m.shear * area / (0.5 * h_));
+            const Vector slides = v[i] - carried, normal = (1 / area) * faces;
+            // rho (g/xi) v_t^2 on the faces' area
+            const double drag =
+                counts ? -s * at(w.dragging, k) * at(rho, k) * (dot(slides, slides) - dot(slides, normal) * dot(slides, normal)) : 0;
+            const auto f = return_to_coulomb(slip[i], in.dt * slides, normal, most + drag, m.shear * area / (0.5 * h_));
             slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
             const Vector all = counts ? push + f.force : f.force;
             out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;

@@ -17,6 +17,7 @@
 // moves, v_i less the velocity of the face stands for v_i, and its power counts apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/height_field.hpp"
 #include <algorithm>
 
@@ -175,6 +176,11 @@ struct GroundPoint {
     std::vector<Face> faces;
     int wall; // its own
 };
+/// Coulomb's friction of a face, rad.
+inline double friction_at(const GroundPoint& w, const Face& face, const scene::Wall& wall)
+{
+    return scene::friction_angle_at(wall, w.x + face.depth * face.normal);
+}
 /// The face at which a point mirrors particle i, x_ij = x_i - x_w: the nearest that has i in front, else the nearest.
 inline const Face& mirroring(const GroundPoint& w, Vector x_ij)
 {
@@ -259,7 +265,7 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
         of_i.power -= dot(push, velocity_of(w, face, s.motion)) / i.density;
         of_i.next_power -= dot(push, velocity_of(w, face, s.next_motion)) / i.density;
         if (wall.surface == scene::Surface::Coulomb)
-            of_i.friction += std::tan(wall.friction_angle) * -i.volume * i.density * Pi * dot(grad, face.normal);
+            of_i.friction += std::tan(friction_at(w, face, wall)) * -i.volume * i.density * Pi * dot(grad, face.normal);
     }
     // The limit of friction follows what presses: d limit/dt = (tan(delta) p - limit)/lag, lag = 4 h/c_p, implicit.
     const double lag = 4 * s.how.h / s.soils[std::size_t(soil.soil[k])].c_p;
@@ -332,7 +338,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     Vector stress{}, art{}, held{}, push{}; // N/m^3; push: of Coulomb faces
     Vector inward{};                        // of a unit of pressure on free faces, 1/m
     Vector area{};                          // of Coulomb faces, along their normals, 1/m
-    double limit = 0, approach = 0;
+    double limit = 0, approach = 0, dragging = 0;
     double held_power[2] = {}, push_power[2] = {}; // of walls in this step and the next, W/m^3
     Vector carried[2] = {};                        // sum of face areas times their velocities
     double all_faces = 0;
@@ -363,7 +369,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
             const double sunk = std::holds_alternative<scene::Ground>(wall.shape) ? std::max(face.depth - dot(r, face.normal), 0.0) : 0.0;
             const double omega = 0.3 * material.c_p / s.how.h;
             out = {length(r), (omega * omega * sunk) * face.normal,
-                   wall.surface == scene::Surface::Coulomb ? std::tan(wall.friction_angle) : 0.0};
+                   wall.surface == scene::Surface::Coulomb ? std::tan(friction_at(w, face, wall)) : 0.0};
         }
         const Vector traction = mirror * i.volume * (i.stress * grad); // adjoint to the strain
         inward = inward + mirror * i.volume * crossing(wall, face, grad);
@@ -375,8 +381,9 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
             continue;
         }
         push = push + crossing(wall, face, traction);
-        limit += std::tan(wall.friction_angle) * dot(traction, face.normal);
+        limit += std::tan(friction_at(w, face, wall)) * dot(traction, face.normal);
         const double facing = mirror * i.volume * dot(grad, face.normal); // negative in front of the face
+        dragging -= facing * wall.drag;
         area = area - facing * face.normal, approach += facing * dot(i.v - v_w[0], face.normal);
         for (int t = 0; t < 2; ++t) carried[t] = carried[t] + facing * v_w[t];
         all_faces += facing;
@@ -395,14 +402,15 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         for (int t = 0; t < 2; ++t) power[t] += felt ? push_power[t] / i.density : 0;
         if (all_faces != 0)
             for (Vector& c : carried) c = (1 / all_faces) * c; // the mean velocity of the faces
-        if (of_i.friction > 0) {
+        const Vector n = (1 / length(area)) * area, along = (i.v - carried[0]) - dot(i.v - carried[0], n) * n;
+        // The wall's drag, rho v_t^2 times its number, carries beside friction.
+        const double most = of_i.friction + (felt ? dragging * dot(along, along) : 0);
+        if (most > 0) {
             const double stiffness = material.shear * length(area) / (s.how.h / 2) / i.density; // 1/s^2
-            const Vector n = (1 / length(area)) * area;
             Vector slip = kept.slip + dt * (i.v - carried[0]);
             slip = slip - dot(slip, n) * n;
             of_i.rubs = Forced::Rubs::Sticks;
-            if (const double trial = stiffness * length(slip); trial > of_i.friction)
-                slip = (of_i.friction / trial) * slip, of_i.rubs = Forced::Rubs::Slides;
+            if (const double trial = stiffness * length(slip); trial > most) slip = (most / trial) * slip, of_i.rubs = Forced::Rubs::Slides;
             of_i.slip = slip;
             by_walls = by_walls - stiffness * slip;
             for (int t = 0; t < 2; ++t) power[t] -= stiffness * dot(slip, carried[t]);

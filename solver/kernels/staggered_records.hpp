@@ -3,6 +3,7 @@
 // of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice.
 #include "solver/kernels/cluster_pass.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/walls/adjoint.hpp"
@@ -101,8 +102,8 @@ public:
                     const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
                     to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
                                         T(wall.surface == scene::Surface::Rough), T(coulomb),
-                                        T(coulomb ? std::tan(wall.friction_angle) : 0), T(0),
-                                        T(std::holds_alternative<scene::Ground>(wall.shape))});
+                                        T(coulomb ? std::tan(scene::friction_angle_at(wall, f.foot(at))) : 0), T(0),
+                                        T(std::holds_alternative<scene::Ground>(wall.shape)), T(wall.drag)});
                 }
                 to.first[k + 1] = Index(to.faces.size());
                 if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);

@@ -86,6 +86,13 @@ void check_stages(const Scene& scene, StepLimit limit, Rules& rules)
                 rules.error(text("event.{}", order[k]),
                             text("{} ({}): {}: {}", time_in_words(e), in_words(scene, e), issue.key, issue.text));
     }
+    if (scene.terrain && scene.accuracy.scheme == Scheme::LeapFrog)
+        for (const auto& [key, there] :
+             {std::pair("friction_map", !scene.terrain->friction_map.empty()), {"xi", scene.terrain->xi.has_value()}})
+            if (there)
+                rules.error(text("terrain.{}", key), text("the leap-frog scheme knows one Coulomb friction for the whole ground. Remedy: "
+                                                          "accuracy.scheme = \"staggered\", or no {}",
+                                                          key));
     if (!scene.events.empty() && scene.accuracy.scheme == Scheme::LeapFrog &&
         std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); }))
         rules.warning("wall", "the leap-frog scheme does not tell the force on each wall: there will be no forces.csv");

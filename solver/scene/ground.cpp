@@ -7,6 +7,14 @@
 
 namespace kuzure::scene {
 
+double friction_angle_at(const Wall& wall, Vector x)
+{
+    const auto* ground = std::get_if<Ground>(&wall.shape);
+    if (!ground || !ground->friction) return wall.friction_angle;
+    const double there = bilinear(*ground->friction, x.x, x.y);
+    return std::isfinite(there) ? there : wall.friction_angle;
+}
+
 bool has_left(const Scene& s, Vector x)
 {
     const HeightField* ground = ground_of(s);

@@ -11,6 +11,9 @@ inline const HeightField* ground_of(const Scene& s)
     return nullptr;
 }
 
+/// Coulomb's friction of a wall at the point x (m) of its face, rad.
+double friction_angle_at(const Wall&, Vector x);
+
 /// True where soil at x (m) has left real ground for good, in a scene whose ground lets it: no ground below it nor, within two supports,
 /// beside it, and no other wall below it.
 bool has_left(const Scene&, Vector x);

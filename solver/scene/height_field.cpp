@@ -5,6 +5,15 @@
 
 namespace kuzure::scene {
 
+double bilinear(const Grid& g, double x, double y)
+{
+    const double u = (x - g.x) / g.cell, v = (y - g.y) / g.cell;
+    if (!(u >= 0 && v >= 0 && u <= g.columns - 1 && v <= g.rows - 1)) return std::numeric_limits<double>::quiet_NaN();
+    const int i = std::min(int(u), g.columns - 2), j = std::min(int(v), g.rows - 2);
+    const double a = u - i, b = v - j;
+    return (1 - b) * ((1 - a) * g.at(i, j) + a * g.at(i + 1, j)) + b * ((1 - a) * g.at(i, j + 1) + a * g.at(i + 1, j + 1));
+}
+
 Grid averaged(const Grid& g, int n)
 {
     ensure(n >= 1, "a grid is averaged over no points");

@@ -29,6 +29,8 @@ struct Grid {
 /// The mean of blocks of n x n values, for grids finer than what stands on them; NaN where one of a block is. Rows and columns that fill
 /// no block are left out.
 Grid averaged(const Grid&, int n);
+/// Bilinear between the points; NaN beyond them, and where one of the four has no number.
+double bilinear(const Grid&, double x, double y);
 
 /// A surface with continuous slopes through a grid of heights: quadratic B-splines about the points with the coefficients
 /// c = f - (second differences of f)/8 (Sablonniere's quasi-interpolant), which reproduce every quadratic polynomial.

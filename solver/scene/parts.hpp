@@ -44,7 +44,8 @@ struct Ground {
     std::shared_ptr<const HeightField> field; // as wide as the wall
     double depth = 0;                         // m, of the wall particles' layer, along z
     GroundLattice lattice = GroundLattice::Draped;
-    bool operator==(const Ground&) const; // by its heights
+    std::shared_ptr<const Grid> friction; // rad, Coulomb's; null: the wall's everywhere
+    bool operator==(const Ground&) const; // by its heights and friction
 };
 /// A closed ring of corners in plan, m; the last corner is not the first again.
 using Ring = std::vector<std::array<double, 2>>;
@@ -121,6 +122,7 @@ struct Wall {
     std::string name = {};     // empty: none
     bool present = true;       // as of a body
     Pose pose = {};            // where events have moved it
+    double drag = 0;           // beside Coulomb's friction: a traction of rho v^2 times this
     bool operator==(const Wall&) const = default;
 };
 

@@ -68,6 +68,8 @@ struct Terrain {
     std::optional<std::array<double, 4>> window; // m, x and y from, x and y to, in the CRS; absent: what releases reach
     Surface surface = Surface::Coulomb;
     double friction_angle = 0; // rad, for Coulomb
+    std::string friction_map;  // raster of such angles, an absolute path
+    std::optional<double> xi;  // m/s^2, Voellmy's: a traction of rho g v^2/xi beside friction
     Edge edge = Edge::Open;
     GroundLattice lattice = GroundLattice::Draped;
     bool operator==(const Terrain&) const = default;

@@ -8,7 +8,8 @@ namespace kuzure::scene {
 
 bool Ground::operator==(const Ground& o) const
 {
-    return depth == o.depth && lattice == o.lattice && (field == o.field || (field && o.field && field->grid() == o.field->grid()));
+    return depth == o.depth && lattice == o.lattice && (field == o.field || (field && o.field && field->grid() == o.field->grid())) &&
+           (friction == o.friction || (friction && o.friction && *friction == *o.friction));
 }
 bool Release::operator==(const Release& o) const
 {
@@ -156,13 +157,7 @@ double thickness(const Release& r, double x, double y)
 {
     if (!std::isfinite(r.bed->at(x, y).z) || !(r.rings.empty() || encloses(r.rings, x, y))) return 0;
     if (!r.thicknesses) return r.thickness.value_or(0);
-    // Bilinear between the points of the map; what has no number there holds no soil.
-    const Grid& g = *r.thicknesses;
-    const double u = (x - g.x) / g.cell, v = (y - g.y) / g.cell;
-    if (!(u >= 0 && v >= 0 && u <= g.columns - 1 && v <= g.rows - 1)) return 0;
-    const int i = std::min(int(u), g.columns - 2), j = std::min(int(v), g.rows - 2);
-    const double a = u - i, b = v - j;
-    const double h = (1 - b) * ((1 - a) * g.at(i, j) + a * g.at(i + 1, j)) + b * ((1 - a) * g.at(i, j + 1) + a * g.at(i + 1, j + 1));
+    const double h = bilinear(*r.thicknesses, x, y); // what has no number there holds no soil
     return h > 0 ? h : 0;
 }
 

@@ -25,6 +25,7 @@ template <class T> struct FaceRecord {
     T tangent; // tan(friction angle)
     T last;    // 1 for the last face of its point
     T holds;   // 1 where sunk soil is held out: real ground
+    T drag;    // traction over rho v^2
 };
 /// How the surface moves there, m/s: in this step, and in the step to come.
 template <class T> struct FaceMotion {
@@ -43,7 +44,7 @@ template <class T> struct WallRecords {
 template <class V> struct Mirror {
     Vec3<V> normal;
     V factor; // (v_i - v_j)/v_i of what is mirrored
-    V stick, coulomb, tangent;
+    V stick, coulomb, tangent, drag;
     Vec3<V> v{}, next{}; // of the surface, m/s, in this step and in the one to come; only where walls move
     V sunk;              // of the particle behind the face where sunk soil is held out, in the unit of the pair sums; else 0
 };
@@ -63,7 +64,15 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
     const auto of = [&](const FaceRecord<T>& f) {
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
         const V along = dot(r, n), depth(f.depth);
-        Mirror<V> m{n, law.factor(along, depth), V(f.stick), V(f.coulomb), V(f.tangent), {}, {}, V(f.holds) * max(depth - along, V(T(0)))};
+        Mirror<V> m{n,
+                    law.factor(along, depth),
+                    V(f.stick),
+                    V(f.coulomb),
+                    V(f.tangent),
+                    V(f.drag),
+                    {},
+                    {},
+                    V(f.holds) * max(depth - along, V(T(0)))};
         if constexpr (moving) {
             m.v = {V(motion->vx), V(motion->vy), V(motion->vz)};
             m.next = {V(motion->next_x), V(motion->next_y), V(motion->next_z)};
@@ -82,7 +91,7 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
         m.normal = {select(use, next.normal.x, m.normal.x), select(use, next.normal.y, m.normal.y), select(use, next.normal.z, m.normal.z)};
         m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
         m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
-        m.sunk = select(use, next.sunk, m.sunk);
+        m.sunk = select(use, next.sunk, m.sunk), m.drag = select(use, next.drag, m.drag);
         if constexpr (moving) {
             m.v = {select(use, next.v.x, m.v.x), select(use, next.v.y, m.v.y), select(use, next.v.z, m.v.z)};
             m.next = {select(use, next.next.x, m.next.x), select(use, next.next.y, m.next.y), select(use, next.next.z, m.next.z)};

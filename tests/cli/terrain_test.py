@@ -150,7 +150,7 @@ def scene(*changes):
     return text
 
 
-DEM, RELEASE = 'dem = "dem.asc"', "thickness = 4.0"
+DEM, RELEASE, FRICTION = 'dem = "dem.asc"', "thickness = 4.0", "friction = 24.0"
 NO_CRS = ('crs = "EPSG:6670"\n', "")
 NO_WINDOW = ("window = [-1696.0, -12796.0, -1530.0, -12670.0]\n", "")
 
@@ -363,6 +363,37 @@ def main():
             f"{words} is written as it was read",
         )
 
+    # ---- friction from a raster: the numbers count, not the file; one number everywhere is that number
+    rubbed = [[24.0 + (x < 40) for x in range(COLUMNS)]] * ROWS
+    rubbed_in_part = [[24.0 if x > 40 else -9999.0 for x in range(COLUMNS)]] * ROWS
+    write("r1.tif", tiff(rubbed))
+    write("r2.asc", asc(rubbed))
+    write("r2.prj", open(path("dem.prj")).read() if os.path.exists(path("dem.prj")) else "EPSG:6670")
+    write("r3.tif", tiff([[x + 0.5 for x in row] for row in rubbed]))
+    hashes = []
+    for change in ('friction_map = "r1.tif"', 'friction = 3.0\nfriction_map = "r2.asc"', 'friction_map = "r3.tif"'):
+        write("words.toml", scene((FRICTION, change)))
+        hashes.append(hashed("words.toml"))
+    check(
+        len({want, *hashes}) == 4 and all(len(h) == 16 for h in hashes),
+        f"friction by a raster, and other rasters, are other scenes: {hashes}",
+    )
+    states = {}
+    for name, change in {
+        "number": FRICTION,
+        "same": 'friction_map = "same.tif"',
+        "part": 'friction = 24.0\nfriction_map = "part.tif"',
+        "other": 'friction_map = "r1.tif"',
+        "dragged": FRICTION + "\nxi = 20.0",
+    }.items():
+        write("same.tif", tiff([[24.0] * COLUMNS] * ROWS))
+        write("part.tif", tiff(rubbed_in_part))
+        write("words.toml", scene((FRICTION, change)))
+        code, said = call("run", "words.toml", "-o", f"bed_{name}", "--threads", "1", "-q", "--set", "time.end=0.5")
+        states[name] = json.load(open(path(f"bed_{name}/summary.json")))["state_hash"] if code == 0 else said[-300:]
+    check(states["same"] == states["part"] == states["number"], f"a raster of 24 degrees, with gaps or without, is friction = 24: {states}")
+    check(len(set(states.values())) == 3, f"another raster, and drag, are another slide: {states}")
+
     # ---- doubtful
     doubts = {
         "edge": ([], "the edge of the ground lies within reach"),
@@ -421,6 +452,33 @@ def main():
             {"w.tif": tiff(grid), "v.tif": tiff(grid, epsg=6671)},
             [(DEM, 'dem = ["w.tif", "v.tif"]'), NO_CRS],
             ["v.tif: it is in"],
+        ),
+        "friction_none": (
+            {"w.tif": tiff(rubbed_in_part)},
+            [(FRICTION, 'friction_map = "w.tif"')],
+            ["terrain.friction_map", "w.tif: no data at", "friction = 24.0"],
+        ),
+        "friction_zero": (
+            {"w.tif": tiff([[0.0 if x < 30 else 20.0 for x in range(COLUMNS)]] * ROWS)},
+            [(FRICTION, 'friction_map = "w.tif"')],
+            ["terrain.friction_map", "found 0 at"],
+        ),
+        "friction_other_crs": (
+            {"w.tif": tiff(grid, epsg=6671)},
+            [(FRICTION, 'friction_map = "w.tif"')],
+            ["terrain.friction_map", "w.tif: it is in"],
+        ),
+        "friction_map_rough": (
+            {"w.tif": tiff(rubbed)},
+            [(FRICTION, 'surface = "rough"\nfriction_map = "w.tif"')],
+            ["terrain.friction_map", "rough or smooth"],
+        ),
+        "xi_rough": ({}, [(FRICTION, 'surface = "rough"\nxi = 500.0')], ["terrain.xi", "rough or smooth"]),
+        "xi_zero": ({}, [(FRICTION, FRICTION + "\nxi = 0.0")], ["terrain.xi", "0 < x"]),
+        "xi_leap_frog": (
+            {},
+            [(FRICTION, FRICTION + "\nxi = 500.0"), ("[terrain]", '[accuracy]\nscheme = "leap-frog"\n[terrain]')],
+            ["terrain.xi", 'accuracy.scheme = "staggered"'],
         ),
         "dem_absent": ({}, [(DEM, 'dem = "nowhere.tif"')], ["nowhere.tif: cannot be opened", "scene file's directory"]),
         "dem_directory": ({}, [(DEM, 'dem = "."')], ["found a directory"]),
@@ -490,7 +548,11 @@ def main():
         "window_three": ({}, [("-1696.0, -12796.0, -1530.0, -12670.0", "1.0, 2.0, 3.0")], ["terrain.window: expected four numbers"]),
         "window_tiny": ({}, [("-1530.0, -12670.0", "-1692.0, -12792.0")], ["terrain.window", "at least 5 x 5 cells"]),
         "friction_none": ({}, [("friction = 24.0\n", "")], ["terrain.friction: expected the friction angle"]),
-        "friction_beside_rough": ({}, [("friction = 24.0", 'friction = 24.0\nsurface = "rough"')], ["terrain.friction: expected no angle"]),
+        "friction_beside_rough": (
+            {},
+            [("friction = 24.0", 'friction = 24.0\nsurface = "rough"')],
+            ["terrain.friction: expected none beside a rough"],
+        ),
         "friction_radians": ({}, [("friction = 24.0", "friction = 124.0")], ["terrain.friction: expected a number in deg"]),
         "flat": ({}, [("dimensions = 3", "dimensions = 2")], ["dimensions = 3"]),
         "release_alone": (

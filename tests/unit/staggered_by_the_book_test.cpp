@@ -406,6 +406,8 @@ TEST(StaggeredByTheBook, RealGroundHoldsSunkSoilOut)
         for (int column = 0; column < heights.columns; ++column)
             heights.values.push_back(1.2 * dx * std::sin(heights.x_of(column) / (3 * dx)) + 0.4 * heights.y_of(row) - 0.1 * e);
     const scene::Ground ground{std::make_shared<scene::HeightField>(heights), 5 * dx};
+    scene::Grid frictions = heights; // rad
+    frictions.for_each([&](int i, int j, std::size_t k) { frictions.values[k] = i > 14 ? std::nan("") : 0.3 + 0.02 * i + 0.01 * j; });
     int sunk = 0;
     for (const Scene& bare : scenes(staggered)) {
         if (bare.dimensions == 2) continue;
@@ -413,11 +415,22 @@ TEST(StaggeredByTheBook, RealGroundHoldsSunkSoilOut)
             for (const auto arranged : {Disorder, Soils}) {
                 Scene s = bare;
                 s.walls = {{ground, scene::Surface(surface), surface == 2 ? 0.4 : 0.0}};
+                if (surface == 2 && arranged == Soils) { // of which friction and drag are not the same everywhere
+                    s.walls[0].drag = 30;
+                    std::get<scene::Ground>(s.walls[0].shape).friction = std::make_shared<scene::Grid>(frictions);
+                }
                 const Cloud c = cloud(arranged, s);
                 for (Index i = 0; i < c.particles.size(); ++i)
                     sunk += scene::signed_distance(ground, std::as_const(c.particles)[field::position][i]) < 0;
                 const Read read = by_the_book(c);
                 expect_by_the_book(c, read, std::string(surfaces[surface]) + " ground, " + arrangements[arranged]);
+                if (surface == 2 && arranged == Soils) {
+                    Scene dragged = s, even = s;
+                    dragged.walls[0].drag *= 1.1;
+                    std::get<scene::Ground>(even.walls[0].shape).friction.reset();
+                    for (const Scene& mistaken : {dragged, even})
+                        EXPECT_GT(difference(c, passed(c, Arithmetic::Simd, read), by_the_book(c, &mistaken)).acceleration, 10 * rough);
+                }
                 if (surface == 0 || arranged == Soils) continue;
                 // the control: how deep soil has sunk below the face
                 const auto deeper = [](book::GroundPoint& w) {

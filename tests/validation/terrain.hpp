@@ -35,7 +35,8 @@ struct GroundScene {
     SceneText text;
     scene::Grid ground;
     scene::Ring outline;
-    double thickness = 1, friction = 20;
+    double thickness = 1, friction = 20, drag = 0;
+    scene::Grid frictions = {}; // rad; without values `friction` everywhere
     scene::Surface surface = scene::Surface::Coulomb;
     scene::InitialStress stress = scene::InitialStress::AtRest;
     std::shared_ptr<const scene::Grid> thicknesses = {};
@@ -48,7 +49,9 @@ struct GroundScene {
     scene::Wall wall() const
     {
         const auto field = std::make_shared<scene::HeightField>(ground);
-        return {scene::Ground{field, scene::ground_depth(*field, 2 * text.h * text.spacing)}, surface, friction * pi / 180};
+        scene::Ground shape{field, scene::ground_depth(*field, 2 * text.h * text.spacing)};
+        if (!frictions.values.empty()) shape.friction = std::make_shared<scene::Grid>(frictions);
+        return {.shape = std::move(shape), .surface = surface, .friction_angle = friction * pi / 180, .drag = drag};
     }
     scene::Release release() const
     {

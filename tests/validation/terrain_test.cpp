@@ -256,6 +256,33 @@ TEST(Terrain, SoilTornOpenAtTheRimOfItsPitDoesNotSink)
     EXPECT_GT(centre(sim).x, 0.5);
 }
 
+TEST(Terrain, BlockWithDragTendsToTheSpeedOfVoellmy)
+{
+    // h dv/dt = g h (sin b - tan delta cos b) - g v^2/xi: v = w tanh(a t/w), way = w^2/a ln cosh(a t/w)
+    const double xi = 20, slope = 30, delta = 20, t = 2, b = radians(slope);
+    auto g = block(slope, delta);
+    const double h = g.thickness * std::cos(b), a = gravity * (std::sin(b) - std::tan(radians(delta)) * std::cos(b));
+    const double w = std::sqrt(xi * h * a / gravity), expected = w * w / a * std::log(std::cosh(a * t / w));
+    g.drag = 9.81 / xi;
+    const double way = slide(g).along;
+    EXPECT_NEAR(way / expected, 1, 0.02) << way << " m, by Voellmy " << expected << " m";
+    EXPECT_GT(by_coulomb(slope, delta, t) / expected, 1.3) << "the control: without drag";
+}
+
+TEST(Terrain, FrictionIsThatOfTheMap)
+{
+    // Half of the slope holds the block, the other lets it go; a map of one number is that number.
+    auto g = block(30, 20);
+    const double all = slide(g).along;
+    g.frictions = heights([](double, double) { return radians(20); }, {-20, -20}, {20, 20}, 1.0);
+    g.friction = 89; // where the map has none
+    EXPECT_EQ(slide(g).along, all);
+    g.frictions = heights([](double, double y) { return radians(y < 8 ? 35 : 5); }, {-20, -20}, {20, 20}, 1.0);
+    EXPECT_LT(slide(g).along, 0.01 * g.text.spacing);
+    g.frictions = heights([](double, double y) { return radians(y < 8 ? 20 : 35); }, {-20, -20}, {20, 20}, 1.0);
+    EXPECT_EQ(slide(g).along, all) << "what lies where the block never comes does not count";
+}
+
 TEST(Terrain, ClosedEdgeEndsTheRunWhereSoilLeaves)
 {
     auto g = block(30, 10);

@@ -210,6 +210,10 @@ Base base_of(const scene::CheckedScene& checked, const std::optional<scene::Unce
         throw BadInput(fmt::format("{}: uncertain.bed_friction: expected ground or a wall with Coulomb friction, found none. Remedy: "
                                    "terrain.friction, or surface = {{ friction_angle = 20.0 }} of a wall",
                                    file));
+    if (u.bed_friction && s.terrain && !s.terrain->friction_map.empty())
+        throw BadInput(fmt::format("{}: uncertain.bed_friction: expected one friction for the whole ground, found terrain.friction_map. "
+                                   "Remedy: leave one of them out",
+                                   file));
     if (u.thickness) {
         int others = 0;
         for (const auto& body : s.bodies) {

@@ -37,6 +37,11 @@ public:
         if (a.at && !(*a.at > 0 && std::isfinite(*a.at)))
             throw BadInput(fmt::format("--at: expected a time above 0 s, found {:g}. Remedy: --at {:g}, or none for the scene's start",
                                        *a.at, s.time.end));
+        if (s.terrain && !s.terrain->friction_map.empty())
+            throw BadInput(
+                fmt::format("{}: terrain.friction_map: expected one friction for the whole ground, which is reduced as the soil's "
+                            "strength is. Remedy: friction instead",
+                            a.scene.file));
         std::error_code error;
         if (!s.start.from.empty() && !std::filesystem::exists(s.start.from, error))
             throw BadInput(fmt::format("{}: start.from: {}: expected the result directory of a run, or a checkpoint; found nothing there. "
