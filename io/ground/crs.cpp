@@ -9,6 +9,7 @@
 #include <map>
 #include <proj.h>
 #include <proj_experimental.h>
+#include <sstream>
 #endif
 
 namespace kuzure::io {
@@ -126,6 +127,19 @@ Pj by_number(PJ_CONTEXT* c, std::string authority, const std::string& code)
     return Pj(proj_create_from_database(c, authority.c_str(), code.substr(0, code.find('+')).c_str(), PJ_CATEGORY_CRS, 0, nullptr));
 }
 
+/// A PROJ string with its +proj= in front, by which PROJ knows it; empty where a word has no plus, or none is +proj=.
+std::string proj_words(const std::string& text)
+{
+    std::istringstream in(text);
+    std::string first, others;
+    for (std::string word; in >> word;) {
+        if (!word.starts_with("+")) return {};
+        if (first.empty() && word.starts_with("+proj=")) first = word;
+        else others += " " + word;
+    }
+    return first.empty() ? first : first + others;
+}
+
 /// "EPSG:6670", "urn:ogc:def:crs:EPSG::6670", WKT, a PROJ string, PROJJSON. Each by its own way: what is none of them PROJ would take for
 /// a name, and find a system whose name is like it.
 Pj by_its_form(PJ_CONTEXT* c, const std::string& text)
@@ -134,9 +148,11 @@ Pj by_its_form(PJ_CONTEXT* c, const std::string& text)
     const auto colon = text.find(':');
     if (text.starts_with("{")) return Pj(proj_create(c, text.c_str()));
     if (text.find_first_of("[(") != text.npos) return Pj(proj_create_from_wkt(c, text.c_str(), nullptr, nullptr, nullptr));
-    if (text.find("+proj=") != text.npos) {
-        Pj p(proj_create(c, text.c_str()));
-        if (!is_crs(p) && text.find("+type=crs") == text.npos) p.reset(proj_create(c, (text + " +type=crs").c_str()));
+    if (text.starts_with("+")) {
+        const auto words = proj_words(text);
+        if (words.empty()) return Pj();
+        Pj p(proj_create(c, words.c_str()));
+        if (!is_crs(p) && words.find("+type=crs") == words.npos) p.reset(proj_create(c, (words + " +type=crs").c_str()));
         return p;
     }
     if (text.starts_with(urn) && text.find(':', urn.size()) != text.npos)

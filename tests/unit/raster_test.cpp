@@ -149,12 +149,18 @@ TEST(CoordinateSystems, ANameIsNotGuessedAt)
 {
     // PROJ finds a system whose name is like each of these.
     for (const char* text : {"Tokyo", "JGD2011", "WGS 84", "JGD2011 / Japan Plane Rectangular CS", "EPSG:4326 and more", "lambert", "", " ",
-                             "WGS:84", "Tokyo:x"})
+                             "WGS:84", "Tokyo:x", "somewhere +proj= 999", "+proj=utm zone 32", "+ellps=GRS80", "Tokyo +proj=utm +zone=32"})
         EXPECT_THROW(crs_from(text, "test"), BadInput) << text;
     const auto wkt = crs_from("EPSG:6670", "test");
     for (const std::string& text : {std::string("  EPSG:6670\r\n"), std::string("epsg:6670+6695"),
                                     std::string("urn:ogc:def:crs:EPSG::6670"), wkt + "\n", "\t" + esri_wkt(wkt)})
         EXPECT_EQ(crs_from(text, "test"), wkt) << text;
+}
+
+TEST(CoordinateSystems, AProjStringMayBeginWithAnyWord)
+{
+    const auto first = crs_from("+proj=utm +zone=32 +ellps=GRS80 +units=m", "test");
+    EXPECT_EQ(crs_from("+ellps=GRS80 +proj=utm +zone=32 +units=m +type=crs", "test"), first);
 }
 
 TEST_F(Rasters, TheLibrariesSayNothingThemselves)
