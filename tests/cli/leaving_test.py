@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Soil that runs off an elevation model is taken out of the run and counted: the same bits on any ranks, through a restart, with a
 ledger that closes, also where all of it leaves. Run as leaving_test.py PROGRAM."""
-import json, os, subprocess, sys
+import json, os, subprocess, sys, time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, finish, program, root, scratch
@@ -77,12 +77,14 @@ def main():
     for ranks in (2, 4):
         other = run(f"ranks{ranks}", ranks=ranks)
         check(other["state_hash"] == whole["state_hash"], f"the same bits on {ranks} ranks")
-    # In legs that the clock ends somewhere, on one rank and on two in turn.
+    # In legs that the clock ends somewhere, a third of the run's time each, on one rank and on two in turn.
+    began = time.monotonic()
     finer = run("finer", "--set", "space.spacing=0.7")
+    minutes = str((time.monotonic() - began) / 180)
     code, legs, again = 5, 0, []
     while code == 5 and legs < 200:
         launcher = ["mpirun", "-n", "2"] if legs % 2 else []
-        leg = ["run", "s.toml", "-o", "legs", "--threads", "1", "-q", "--max-minutes", "0.005", "--set", "space.spacing=0.7", *again]
+        leg = ["run", "s.toml", "-o", "legs", "--threads", "1", "-q", "--max-minutes", minutes, "--set", "space.spacing=0.7", *again]
         code = subprocess.run([*launcher, program, *leg], capture_output=True, timeout=300, cwd=work).returncode
         legs, again = legs + 1, ["--restart"]
     ended = json.load(open(os.path.join(work, "legs", "summary.json")))
