@@ -7,7 +7,7 @@
 namespace kuzure::io {
 namespace {
 
-constexpr Rgb ink{33, 37, 41}, plain{236, 236, 232};
+constexpr Rgb ink{33, 37, 41}, plain{236, 236, 232}, height_line{128, 92, 56};
 constexpr std::array<Rgb, 5> outline_colors{{{20, 20, 20}, {0, 77, 168}, {112, 48, 160}, {0, 110, 80}, {140, 70, 0}}};
 constexpr int color_steps = 28, left = 110, top = 70, right = 210, bottom = 80; // pixels, around the map
 constexpr std::array lights{0.55, 0.7, 0.85, 1.0, 1.1};
@@ -24,6 +24,7 @@ Palette palette(bool signs)
     for (int k = 0; k < 12; ++k) all.push_back(lit({255, 255, 255}, k / 11.0));
     for (const auto c : outline_colors) all.push_back(c);
     all.push_back(ink);
+    for (int k = 0; k < 4; ++k) all.push_back(lit(height_line, 1 + 0.25 * k));
     for (int k = 0; k < 40; ++k) all.push_back(lit(plain, 0.3 + 0.78 * k / 39));
     for (int k = 0; k < color_steps; ++k)
         for (const double light : lights) all.push_back(lit(map_color(k / double(color_steps - 1), signs), light));
@@ -82,7 +83,7 @@ double light_at(const MapPicture& m, const View& v, double x, double y)
     const double dx = (m.ground(x + d, y) - m.ground(x - d, y)) / (2 * d), dy = (m.ground(x, y + d) - m.ground(x, y - d)) / (2 * d);
     if (std::isnan(dx) || std::isnan(dy)) return 1;
     const double toward = (1 + (dx - dy) * std::sqrt(0.5)) / std::sqrt(1 + dx * dx + dy * dy);
-    return std::clamp(0.25 + 0.75 * toward, 0.3, 1.08);
+    return std::clamp(0.3 + 0.65 * toward, 0.3, 1.08); // slopes towards the sun keep their relief
 }
 
 struct Scale {
@@ -114,6 +115,53 @@ void draw_cells(Canvas& canvas, const MapPicture& m, const View& v, const Scale&
             const Rgb c = lit(on ? map_color(scale.share(g.at(i, j)), has_signs(m.kind)) : plain, on ? 0.7 + 0.3 * light : light);
             to[column] = 0xff000000u | std::uint32_t(c.r) << 16 | std::uint32_t(c.g) << 8 | c.b;
         }
+    }
+}
+
+/// Lines of equal height of the ground, every fifth with its number.
+void draw_heights(Canvas& canvas, const MapPicture& m, const View& v)
+{
+    if (!m.ground) return;
+    constexpr int pixels = 4; // a sample
+    const int columns = v.width / pixels + 1, rows = v.height / pixels + 1;
+    scene::Grid z{0, 0, 1, columns, rows, {}};
+    z.values.resize(std::size_t(columns) * std::size_t(rows));
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    z.for_each([&](int i, int j, std::size_t k) {
+        const double h = z.values[k] = m.ground(v.x(i * pixels), v.y(j * pixels));
+        if (h < low) low = h;
+        if (h > high) high = h;
+    });
+    if (!(high > low)) return;
+    const double step = round_up((high - low) / 20), size = 12;
+    for (auto level = std::int64_t(std::ceil(low / step)); double(level) * step < high; ++level) {
+        const double at = double(level) * step;
+        const bool numbered = level % 5 == 0;
+        double label_x = 0, label_y = 0, nearest = HUGE_VAL; // to the middle of the picture's left third
+        for (int j = 0; j + 1 < rows; ++j)
+            for (int i = 0; i + 1 < columns; ++i) {
+                // Where the level crosses the four sides of the cell, one after the other around it.
+                const double corner[5] = {z.at(i, j), z.at(i + 1, j), z.at(i + 1, j + 1), z.at(i, j + 1), z.at(i, j)};
+                constexpr int dx[5] = {0, 1, 1, 0, 0}, dy[5] = {0, 0, 1, 1, 0};
+                double crossing[4][2];
+                int n = 0;
+                for (int s = 0; s < 4; ++s) {
+                    if (!((corner[s] < at) != (corner[s + 1] < at)) || std::isnan(corner[s] + corner[s + 1])) continue;
+                    const double t = (at - corner[s]) / (corner[s + 1] - corner[s]);
+                    crossing[n][0] = left + pixels * (i + dx[s] + t * (dx[s + 1] - dx[s]));
+                    crossing[n++][1] = top + pixels * (j + dy[s] + t * (dy[s + 1] - dy[s]));
+                }
+                for (int k = 0; k + 1 < n; k += 2) {
+                    canvas.line(crossing[k][0], crossing[k][1], crossing[k + 1][0], crossing[k + 1][1], numbered ? 1.3 : 0.7, height_line);
+                    const double far = std::hypot(crossing[k][0] - left - 0.3 * v.width, crossing[k][1] - top - 0.5 * v.height);
+                    const bool inside = crossing[k][0] > left + 40 && crossing[k][1] > top + 20 && crossing[k][1] < top + v.height - 50;
+                    if (inside && far < nearest) nearest = far, label_x = crossing[k][0], label_y = crossing[k][1];
+                }
+            }
+        if (!numbered || nearest == HUGE_VAL) continue;
+        const auto text = fmt::format("{:g}", at);
+        canvas.rectangle(label_x - 4 * double(text.size()), label_y - 7, 8 * double(text.size()), 14, plain);
+        canvas.text(label_x, label_y, size, text, height_line, Anchor::Middle);
     }
 }
 
@@ -206,6 +254,7 @@ std::string map_png(const MapPicture& m)
     const Scale scale = scale_of(m);
     Canvas canvas(left + v.width + right, top + v.height + bottom);
     draw_cells(canvas, m, v, scale);
+    draw_heights(canvas, m, v);
     draw_outlines(canvas, m, v);
     draw_axes(canvas, v);
     draw_scale_bar(canvas, v);

@@ -115,8 +115,8 @@ private:
     {
         const Kinematics<T>* neighbours = kinematics_.data();
         const Stresses<T>* records = stresses_.data();
-        const auto [support, support2, softening, tiny] = Below::lengths();
-        const V zero(T(0)), one(T(1));
+        const auto at = Below::lengths();
+        const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Below::in_tension(i, tension_);
         Batch<V> batch;
         ForceSums<V> sums{};

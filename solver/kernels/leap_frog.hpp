@@ -156,8 +156,8 @@ private:
     KUZURE_INLINE std::int64_t sum_over_soil(const Cluster<V>& i, std::span<const Index> near, WideSums& out) const
     {
         const Record<T>* records = now_.data();
-        const auto [support, support2, softening, tiny] = Base::lengths();
-        const V zero(T(0)), one(T(1));
+        const auto at = Base::lengths();
+        const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Base::in_tension(i, tension_);
         Batch<V> batch;
         Sums<V> sums{};

@@ -106,8 +106,8 @@ private:
         const Kinematics<T>* records = kinematics_.data();
         const bool one_soil = in.soils.size() == 1;
         const T* speed = one_soil ? nullptr : speed_.data();
-        const auto [support, support2, softening, tiny] = Below::lengths();
-        const V zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
+        const auto at = Below::lengths();
+        const V support = at.support, softening = at.softening, tiny = at.tiny, zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
         Batch<V> batch;
         StrainSums<V> sums{};
         Below::for_each_batch(

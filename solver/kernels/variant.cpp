@@ -8,6 +8,7 @@ namespace kuzure {
 template <int I> std::unique_ptr<PairModel> make_variant(const scene::Interactions&, Arithmetic);
 
 namespace {
+template <class M, class V> using MirroringStaggered = Staggered<M, V>; // clang counts parameters that have defaults
 template <template <class, class> class Scheme, class M> std::unique_ptr<PairModel> make(const scene::Interactions& s, Arithmetic a)
 {
     const bool mixed = s.precision == scene::Precision::Mixed;
@@ -23,7 +24,7 @@ template <> std::unique_ptr<PairModel> make_variant<VARIANT>(const scene::Intera
     using M = std::tuple_element_t<VARIANT, Variants>;
     if constexpr (has_leap_frog(VARIANT))
         if (s.scheme == scene::Scheme::LeapFrog) return make<LeapFrog, M>(s, a);
-    return make<Staggered, M>(s, a);
+    return make<MirroringStaggered, M>(s, a);
 }
 
 } // namespace kuzure

@@ -166,7 +166,8 @@ void Watch::judge_ledger(const Particles& p, Clock& clock, const Ledger& l)
     clock.largest_energy = std::max(clock.largest_energy, l.state.kinetic + l.state.elastic + std::max(-l.state.potential, 0.0));
     // Against a thousandth of weight times height at least, so that the first movement is not judged by itself.
     const double allowed = limit::given * std::max(clock.largest_energy, 1e-3 * energy_units_per_scale * clock.energy_unit);
-    const auto [why, remedy] = diagnosis(clock);
+    const auto cause = diagnosis(clock);
+    const std::string &why = cause.first, &remedy = cause.second;
     if (-l.dissipated.wall > allowed) {
         const auto id = fastest(p);
         fail_at(p, clock, id,
