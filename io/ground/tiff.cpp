@@ -232,14 +232,15 @@ private:
                                     file_, row + 1, column + 1, last_words()));
     }
 
+    static constexpr std::uint64_t most_bytes = std::uint64_t(1) << 30; // of a tile or a row, which is read as a whole
+
     void read_tiles() const
     {
         std::uint32_t wide = 0, high = 0;
         TIFFGetField(tiff_, TIFFTAG_TILEWIDTH, &wide);
         TIFFGetField(tiff_, TIFFTAG_TILELENGTH, &high);
         const auto size = TIFFTileSize64(tiff_);
-        const std::uint64_t most = std::uint64_t(1) << 30;
-        if (wide == 0 || high == 0 || size > most || size < std::uint64_t(wide) * high * bytes_)
+        if (wide == 0 || high == 0 || size > most_bytes || size < std::uint64_t(wide) * high * bytes_)
             throw BadInput(fmt::format("{}: its tiles of {} x {} cells are no good. {}", file_, wide, high, remedy()));
         std::vector<unsigned char> tile(size);
         const int w = int(wide), h = int(high);
@@ -258,8 +259,8 @@ private:
     void read_rows() const
     {
         const auto size = TIFFScanlineSize64(tiff_);
-        if (size < std::uint64_t(whole_.columns) * bytes_ || size > std::uint64_t(whole_.columns) * bytes_ + 64)
-            throw BadInput(fmt::format("{}: its rows of {} bytes do not hold {} cells. {}", file_, size, whole_.columns, remedy()));
+        if (size > most_bytes || size < std::uint64_t(whole_.columns) * bytes_ || size > std::uint64_t(whole_.columns) * bytes_ + 64)
+            throw BadInput(fmt::format("{}: its rows of {} bytes for {} cells are no good. {}", file_, size, whole_.columns, remedy()));
         std::vector<unsigned char> line(size);
         // A compressed strip can only be read from its beginning.
         std::uint32_t strip_rows = 0;

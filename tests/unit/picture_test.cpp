@@ -1,5 +1,6 @@
 // Pictures of one run share camera and colours, show the soil where it is, in the colours promised, and come from snapshots.
 // Beyond 400 lines: one test a promise of the pictures.
+#include "io/map_picture.hpp"
 #include "io/picture_series.hpp"
 #include "io/snapshot.hpp"
 #include "io/soil_color.hpp"
@@ -443,4 +444,30 @@ TEST(PictureNames, AreTheRunsOwnOrNot)
     EXPECT_EQ(io::picture_number(io::picture_file("a/b", 12).path()), 12);
     EXPECT_FALSE(io::picture_number("picture_speed_cut_000012.png"));
     EXPECT_FALSE(io::picture_number("picture_0000012.png"));
+}
+
+TEST(MapPictures, ShowTheHeightsOfTheGroundAsLines)
+{
+    io::MapPicture m{io::map_kinds[0], "slope", {0, 0, 10, 20, 16, std::vector<double>(320, 2.0)}};
+    const auto lines = [&] { // pixels that are brown though the soil and the shade are not
+        const Image im = decoded(io::map_png(m));
+        int n = 0;
+        for (int y = 75; y < im.height - 85; ++y)
+            for (int x = 115; x < im.width - 215; ++x) {
+                const auto c = im.at(x, y);
+                n += c[0] < 190 && c[0] > c[1] + 12 && c[1] > c[2] + 8;
+            }
+        return n;
+    };
+    m.values.values.assign(320, std::nan("")), m.values.at(10, 8) = 1;
+    EXPECT_EQ(lines(), 0) << "no ground, no lines";
+    m.ground = [](double, double) { return 100.0; };
+    EXPECT_EQ(lines(), 0) << "level ground";
+    m.ground = [](double x, double) { return 100 + 0.5 * x; };
+    const int slope = lines();
+    EXPECT_GT(slope, 2000);
+    m.ground = [](double x, double y) { return y < 80 ? std::nan("") : 100 + 0.5 * x; };
+    const int half = lines();
+    EXPECT_GT(half, 500) << "where there are heights";
+    EXPECT_LT(half, 0.7 * slope) << "and nowhere else";
 }

@@ -71,8 +71,8 @@ Answer answer_of(const Base& base, const std::vector<Run>& runs)
     out.counted.insert(out.counted.end(), members.begin(), members.end());
 
     auto resolutions = likely;
-    const auto repeated = std::ranges::unique(resolutions, {}, [](const Run* r) { return r->spacing; }); // the same run under two names
-    resolutions.erase(repeated.begin(), repeated.end());
+    const auto same = [](const Run* a, const Run* b) { return a->spacing == b->spacing; }; // the same run under two names
+    resolutions.erase(std::unique(resolutions.begin(), resolutions.end(), same), resolutions.end());
     for (const auto* r : resolutions) out.discretisation.samples.push_back({r->layers, r->maps->reach});
     judge_resolutions(std::move(resolutions), out.discretisation);
 
