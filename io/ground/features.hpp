@@ -8,6 +8,8 @@ namespace kuzure::io::ground {
 inline constexpr const char* mend = "Remedy: in QGIS, Vector geometry > Fix geometries, or draw it again";
 
 std::string lower(std::string);
+/// True for what can be coordinates in metres or degrees: the Earth is 4e7 m around, and areas stay numbers.
+bool on_map(double x, double y);
 /// Throws BadInput: the file, its feature (counted from 0 here), what is wrong with it.
 [[noreturn]] void refuse(const Path&, std::size_t feature, const std::string& text);
 /// A closed ring without its last corner.

@@ -62,6 +62,7 @@ std::array<double, 2> position(const json& j, const GeoJson& g, const Path& path
                fmt::format("({}, {}) is no longitude and latitude, as GeoJSON has them where no \"crs\" stands in it (RFC 7946). "
                            "Remedy: save the layer as .shp, or as GeoJSON in EPSG:4326",
                            p[0], p[1]));
+    if (!on_map(p[0], p[1])) refuse(path, feature, fmt::format("({}, {}) is no place on the map. {}", p[0], p[1], mend));
     return p;
 }
 

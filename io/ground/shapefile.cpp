@@ -147,7 +147,7 @@ NamedPoints points_of_shapefile(const Path& path)
     out.crs = crs_beside(path);
     for (std::size_t k = 0; k < file.count(); ++k) {
         const Object o = file.feature(k);
-        if (o->nSHPType == SHPT_NULL || o->nVertices != 1 || !std::isfinite(o->padfX[0]) || !std::isfinite(o->padfY[0]))
+        if (o->nSHPType == SHPT_NULL || o->nVertices != 1 || !on_map(o->padfX[0], o->padfY[0]))
             refuse(path, k, "it has no place. Remedy: delete the row, or draw its point");
         const auto name = file.attribute("name", k);
         out.points.push_back({name.empty() ? std::to_string(k + 1) : name, o->padfX[0], o->padfY[0]});

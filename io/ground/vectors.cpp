@@ -30,6 +30,8 @@ std::string lower(std::string text)
     return text;
 }
 
+bool on_map(double x, double y) { return std::fabs(x) < 1e9 && std::fabs(y) < 1e9; }
+
 [[noreturn]] void refuse(const Path& path, std::size_t feature, const std::string& text)
 {
     throw BadInput(fmt::format("{}: feature {}: {}", path.string(), feature + 1, text));
@@ -39,7 +41,7 @@ std::string lower(std::string text)
 scene::Ring checked_ring(scene::Ring ring, const Path& path, std::size_t feature)
 {
     for (const auto& p : ring)
-        if (!std::isfinite(p[0]) || !std::isfinite(p[1])) refuse(path, feature, fmt::format("a corner is no place on the map. {}", mend));
+        if (!on_map(p[0], p[1])) refuse(path, feature, fmt::format("a corner is no place on the map. {}", mend));
     if (ring.size() < 2 || ring.front() != ring.back())
         refuse(path, feature,
                ring.empty() ? fmt::format("a ring without corners. {}", mend)

@@ -611,6 +611,11 @@ def main():
             [('"scar.geojson"', '"w.geojson"')],
             ["w.geojson: expected polygons, found no feature"],
         ),
+        "outline_beyond": (
+            {"w.geojson": geojson([[[X0 + 20, Y0 + 50], [X0 + 40, Y0 + 50], [1e200, Y0 + 90], [X0 + 20, Y0 + 50]]])},
+            [('"scar.geojson"', '"w.geojson"')],
+            ["w.geojson: feature 1: (1e+200, -12710) is no place on the map"],
+        ),
         "outline_sliver": (
             {"w.geojson": geojson([[[X0 + 20, Y0 + 50], [X0 + 40, Y0 + 50], [X0 + 20, Y0 + 50]]])},
             [('"scar.geojson"', '"w.geojson"')],

@@ -239,7 +239,7 @@ Layers layers_for(const Base& base, std::size_t count, const std::vector<double>
 void sum_up(const Base& base, const scene::MapGrid& grid, const std::vector<double>& limits, Layers& to, Answer& answer)
 {
     const auto& runs = answer.counted;
-    auto& [layers, reach, arrival, thickness, deep, pressed] = to;
+    auto& layers = to.all;
     std::vector<std::pair<std::int64_t, std::size_t>> wanted; // cell and point
     for (std::size_t k = 0; k < answer.points.size(); ++k) wanted.emplace_back(grid.at(answer.points[k].at.x, answer.points[k].at.y), k);
     std::sort(wanted.begin(), wanted.end());
@@ -248,11 +248,11 @@ void sum_up(const Base& base, const scene::MapGrid& grid, const std::vector<doub
         const double p = double(c.reached()) / double(runs.size());
         const auto when = spread_of(c.arrival), how = spread_of(c.thickness);
         if (c.reached() > 0) {
-            layers[reach].values[k] = p;
-            for (std::size_t q = 0; q < 3; ++q) layers[arrival + q].values[k] = when[q], layers[thickness + q].values[k] = how[q];
-            for (std::size_t l = 0; l < limits.size(); ++l) layers[deep + l].values[k] = exceeding(c.thickness, limits[l]);
+            layers[to.reach].values[k] = p;
+            for (std::size_t q = 0; q < 3; ++q) layers[to.arrival + q].values[k] = when[q], layers[to.thickness + q].values[k] = how[q];
+            for (std::size_t l = 0; l < limits.size(); ++l) layers[to.deep + l].values[k] = exceeding(c.thickness, limits[l]);
             for (std::size_t l = 0; l < base.uncertain.pressures.size(); ++l)
-                layers[pressed + l].values[k] = exceeding(c.pressure, base.uncertain.pressures[l]);
+                layers[to.pressed + l].values[k] = exceeding(c.pressure, base.uncertain.pressures[l]);
         }
         for (auto at = std::lower_bound(wanted.begin(), wanted.end(), std::pair{cell, std::size_t(0)});
              at != wanted.end() && at->first == cell; ++at) {
