@@ -28,13 +28,13 @@ double share_off_ground(const Comm& comm, const Particles& p, const Scene& s, co
     }
     // Along a period nothing is beyond anything.
     const bool along_x = !s.space.periodic[0], along_y = s.dimensions == 3 && !s.space.periodic[1], along_z = !s.space.periodic[2];
-    std::int64_t left = -std::int64_t(p.size());
+    std::int64_t left = 0;
     for (Index i = 0; i < p.size(); ++i) {
         const Vector a = x[i];
         left += (along_x && (a.x < all.low.x || a.x > all.high.x)) || (along_y && (a.y < all.low.y || a.y > all.high.y)) ||
                 (along_z && a.z < all.low.z);
     }
-    const double gone = double(comm.sum(left) + scene::soil_present(s, filling));
+    const double gone = double(comm.sum(left) + taken_out(comm, p, s, filling));
     return gone / double(std::max<std::int64_t>(1, filling.soil_count()));
 }
 } // namespace
@@ -93,6 +93,11 @@ Fronts measure_fronts(const Comm& comm, const Particles& p, const Scene& s, cons
     if (e[0] < -1e299) return {.off_ground = off};
     if (s.dimensions == 2) e[3] = e[4] = 0;
     return {e[0], -e[1], e[2], -e[3], e[4], off};
+}
+
+std::int64_t taken_out(const Comm& comm, const Particles& p, const Scene& s, const scene::Filling& filling)
+{
+    return scene::soil_present(s, filling) - comm.sum(std::int64_t(p.size()));
 }
 
 double resting_volume_ratio(const Comm& comm, const Particles& p, const Scene& scene, const scene::Filling& filling)

@@ -17,6 +17,9 @@ struct Fronts {
 /// Collective; heights count from the lowest soil at the start.
 Fronts measure_fronts(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 
+/// Collective: soil particles that have left real ground and were taken out of the run.
+std::int64_t taken_out(const Comm&, const Particles&, const Scene&, const scene::Filling&);
+
 /// Collective. Mean rho_0/rho of the soil that rests, which moves slower than scene::resting_speed(); 0 where none does.
 double resting_volume_ratio(const Comm&, const Particles&, const Scene&, const scene::Filling&);
 

@@ -2,6 +2,7 @@
 #include "io/ground/crs.hpp"
 #include "io/ground/raster.hpp"
 #include "io/json.hpp"
+#include "solver/app/run/fronts.hpp"
 #include "solver/core/ensure.hpp"
 #include "solver/scene/ground.hpp"
 #include "solver/scene/height_field.hpp"
@@ -210,6 +211,8 @@ void Maps::write(Simulation& sim, Pictures pictures)
     sim.timers().timed(Phase::Maps, [&] {
         double beyond = 0;
         const auto cells = record_.cells(sim.particles(), sim.time(), beyond);
+        // What was taken out counts as it was at first: how dense it was when it left is not kept.
+        beyond += double(taken_out(comm_, sim.particles(), sim.scene(), sim.filling())) * scene_.particle_volume();
         io::on_root(comm_, [&] { write_files(cells, sim.time(), beyond, pictures); });
     });
 }
