@@ -118,14 +118,34 @@ void draw_cells(Canvas& canvas, const MapPicture& m, const View& v, const Scale&
     }
 }
 
+struct Pixel {
+    double x, y;
+};
+/// visit(a, b) for each piece of the line on which the samples, linear between them, reach a level; in samples from the first.
+template <class Visit> void for_each_piece(const scene::Grid& z, double level, Visit visit)
+{
+    constexpr int dx[5] = {0, 1, 1, 0, 0}, dy[5] = {0, 0, 1, 1, 0}; // around a cell
+    for (int j = 0; j + 1 < z.rows; ++j)
+        for (int i = 0; i + 1 < z.columns; ++i) {
+            Pixel crossing[4];
+            int n = 0;
+            for (int s = 0; s < 4; ++s) {
+                const double here = z.at(i + dx[s], j + dy[s]), there = z.at(i + dx[s + 1], j + dy[s + 1]);
+                if ((here < level) == (there < level) || std::isnan(here + there)) continue;
+                const double t = (level - here) / (there - here);
+                crossing[n++] = {i + dx[s] + t * (dx[s + 1] - dx[s]), j + dy[s] + t * (dy[s + 1] - dy[s])};
+            }
+            for (int k = 0; k + 1 < n; k += 2) visit(crossing[k], crossing[k + 1]);
+        }
+}
+
 /// Lines of equal height of the ground, every fifth with its number.
 void draw_heights(Canvas& canvas, const MapPicture& m, const View& v)
 {
     if (!m.ground) return;
     constexpr int pixels = 4; // a sample
-    const int columns = v.width / pixels + 1, rows = v.height / pixels + 1;
-    scene::Grid z{0, 0, 1, columns, rows, {}};
-    z.values.resize(std::size_t(columns) * std::size_t(rows));
+    scene::Grid z{0, 0, 1, v.width / pixels + 1, v.height / pixels + 1, {}};
+    z.values.resize(std::size_t(z.columns) * std::size_t(z.rows));
     double low = HUGE_VAL, high = -HUGE_VAL;
     z.for_each([&](int i, int j, std::size_t k) {
         const double h = z.values[k] = m.ground(v.x(i * pixels), v.y(j * pixels));
@@ -133,35 +153,21 @@ void draw_heights(Canvas& canvas, const MapPicture& m, const View& v)
         if (h > high) high = h;
     });
     if (!(high > low)) return;
-    const double step = round_up((high - low) / 20), size = 12;
+    const double step = round_up((high - low) / 20);
     for (auto level = std::int64_t(std::ceil(low / step)); double(level) * step < high; ++level) {
-        const double at = double(level) * step;
         const bool numbered = level % 5 == 0;
-        double label_x = 0, label_y = 0, nearest = HUGE_VAL; // to the middle of the picture's left third
-        for (int j = 0; j + 1 < rows; ++j)
-            for (int i = 0; i + 1 < columns; ++i) {
-                // Where the level crosses the four sides of the cell, one after the other around it.
-                const double corner[5] = {z.at(i, j), z.at(i + 1, j), z.at(i + 1, j + 1), z.at(i, j + 1), z.at(i, j)};
-                constexpr int dx[5] = {0, 1, 1, 0, 0}, dy[5] = {0, 0, 1, 1, 0};
-                double crossing[4][2];
-                int n = 0;
-                for (int s = 0; s < 4; ++s) {
-                    if (!((corner[s] < at) != (corner[s + 1] < at)) || std::isnan(corner[s] + corner[s + 1])) continue;
-                    const double t = (at - corner[s]) / (corner[s + 1] - corner[s]);
-                    crossing[n][0] = left + pixels * (i + dx[s] + t * (dx[s + 1] - dx[s]));
-                    crossing[n++][1] = top + pixels * (j + dy[s] + t * (dy[s + 1] - dy[s]));
-                }
-                for (int k = 0; k + 1 < n; k += 2) {
-                    canvas.line(crossing[k][0], crossing[k][1], crossing[k + 1][0], crossing[k + 1][1], numbered ? 1.3 : 0.7, height_line);
-                    const double far = std::hypot(crossing[k][0] - left - 0.3 * v.width, crossing[k][1] - top - 0.5 * v.height);
-                    const bool inside = crossing[k][0] > left + 40 && crossing[k][1] > top + 20 && crossing[k][1] < top + v.height - 50;
-                    if (inside && far < nearest) nearest = far, label_x = crossing[k][0], label_y = crossing[k][1];
-                }
-            }
+        Pixel label{};
+        double nearest = HUGE_VAL; // of the line to the middle of the picture's left third
+        for_each_piece(z, double(level) * step, [&](Pixel a, Pixel b) {
+            const double x = left + pixels * a.x, y = top + pixels * a.y;
+            canvas.line(x, y, left + pixels * b.x, top + pixels * b.y, numbered ? 1.3 : 0.7, height_line);
+            const double far = std::hypot(x - left - 0.3 * v.width, y - top - 0.5 * v.height);
+            if (x > left + 40 && y > top + 20 && y < top + v.height - 50 && far < nearest) nearest = far, label = {x, y};
+        });
         if (!numbered || nearest == HUGE_VAL) continue;
-        const auto text = fmt::format("{:g}", at);
-        canvas.rectangle(label_x - 4 * double(text.size()), label_y - 7, 8 * double(text.size()), 14, plain);
-        canvas.text(label_x, label_y, size, text, height_line, Anchor::Middle);
+        const auto text = fmt::format("{:g}", double(level) * step);
+        canvas.rectangle(label.x - 4 * double(text.size()), label.y - 7, 8 * double(text.size()), 14, plain);
+        canvas.text(label.x, label.y, 12, text, height_line, Anchor::Middle);
     }
 }
 
