@@ -70,6 +70,18 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
                       "nothing will sleep: in steps this long a P-wave crosses half a support; 0, or a smaller step");
 }
 
+/// What the schemes know of the ground.
+void check_ground(const Scene& scene, Rules& rules)
+{
+    if (!scene.terrain || scene.accuracy.scheme != Scheme::LeapFrog) return;
+    for (const auto& [key, there] :
+         {std::pair("friction_map", !scene.terrain->friction_map.empty()), {"xi", scene.terrain->xi.has_value()}})
+        if (there)
+            rules.error(text("terrain.{}", key), text("the leap-frog scheme knows one Coulomb friction for the whole ground. Remedy: "
+                                                      "accuracy.scheme = \"staggered\", or no {}",
+                                                      key));
+}
+
 /// The soils, effects and steps of every stage obey the rules of a start.
 void check_stages(const Scene& scene, StepLimit limit, Rules& rules)
 {
@@ -86,13 +98,6 @@ void check_stages(const Scene& scene, StepLimit limit, Rules& rules)
                 rules.error(text("event.{}", order[k]),
                             text("{} ({}): {}: {}", time_in_words(e), in_words(scene, e), issue.key, issue.text));
     }
-    if (scene.terrain && scene.accuracy.scheme == Scheme::LeapFrog)
-        for (const auto& [key, there] :
-             {std::pair("friction_map", !scene.terrain->friction_map.empty()), {"xi", scene.terrain->xi.has_value()}})
-            if (there)
-                rules.error(text("terrain.{}", key), text("the leap-frog scheme knows one Coulomb friction for the whole ground. Remedy: "
-                                                          "accuracy.scheme = \"staggered\", or no {}",
-                                                          key));
     if (!scene.events.empty() && scene.accuracy.scheme == Scheme::LeapFrog &&
         std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); }))
         rules.warning("wall", "the leap-frog scheme does not tell the force on each wall: there will be no forces.csv");
@@ -107,6 +112,7 @@ void check_parts(const Scene& scene, StepLimit limit, Rules& rules)
     check_bodies(scene, rules);
     check_effects(scene, rules);
     check_time(scene, limit, rules);
+    check_ground(scene, rules);
     check_plausible(scene, rules);
     check_inside(scene, rules);
     if (!rules.errors()) check_stages(scene, limit, rules);
