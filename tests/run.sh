@@ -14,6 +14,7 @@ minutes=25 # what the whole may take; the sanitizers are left out, and that is s
 passed=0
 failed=0
 parts=()
+not_run=() # tests of what this machine has not; each says what it is and how to get it
 asan_note=
 mkdir -p build
 exec 9>build/.test-lock
@@ -29,6 +30,7 @@ finish() {
     echo "where the time went:"
     printf '%s\n' "${parts[@]}"
     printf '%7d s  in all\n' $SECONDS
+    [ ${#not_run[@]} = 0 ] || printf 'not run, something is missing here: %s\n' "${not_run[@]}"
     [ -z "$asan_note" ] || echo "$asan_note"
     echo "$passed passed, $failed failed"
     [ $failed = 0 ] && [ $passed -gt 0 ]
@@ -48,15 +50,9 @@ suite() {
     rm -f "$result"
     ctest --test-dir "$directory" --output-on-failure --no-tests=ignore --output-junit "$PWD/$result" "$@" </dev/null
     local status=$? counts
-    # Everything that ran to no success counts as failed: not found and not finished too.
-    if counts=$(/usr/bin/python3 - "$result" <<'PY'
-import sys, xml.etree.ElementTree as tree
-states = [case.get("status") for case in tree.parse(sys.argv[1]).getroot().iter("testcase")]
-good = sum(state == "run" for state in states)
-print(good, len(states) - good)
-PY
-    ); then
-        read -r good bad <<<"$counts"
+    if counts=$(/usr/bin/python3 tests/count.py "$result"); then
+        read -r good bad without <<<"$counts"
+        [ -z "$without" ] || not_run+=("$without")
         [ "$status" = 0 ] || [ "$bad" != 0 ] || bad=1
     else
         good=0 bad=1 # ctest itself broke down

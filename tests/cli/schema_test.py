@@ -79,7 +79,7 @@ def main():
     try:
         import jsonschema
     except ImportError:
-        print("no scene was validated: python3-jsonschema is missing (jobs/install.sh tests)")
+        print("not run: no scene was validated, python3-jsonschema is missing (jobs/install.sh tests)")
         finish(77)
     jsonschema.Draft202012Validator.check_schema(schema)
     valid = jsonschema.Draft202012Validator(schema).is_valid

@@ -745,7 +745,7 @@ def main():
 
 if __name__ == "__main__":
     if "built without maps" in call("terrain", "x.tif")[1]:
-        print("built without maps")
+        print("not run: built without maps (KUZURE_TERRAIN=OFF)")
         sys.exit(77)
     main()
     finish()

@@ -31,6 +31,7 @@ def campaign(kills, seed, kills_a_run=5):
         "second_starters": {s: 0 for s in SECOND},
         "second_starters_ended_beside_a_living_run": 0,
         "second_starters_that_came_first": 0,
+        "second_starters_that_did_it_all_beside_a_living_process": 0,
         "runs": 0,
         "runs_with_the_bits_of_the_undisturbed_one": 0,
         "resumed_from_previous": 0,
@@ -84,7 +85,6 @@ def kill_once(place, scene, out, rng, record):
     early, alive = second.poll(), process.poll() is None
     if early is not None and alive:
         record["second_starters_ended_beside_a_living_run"] += 1
-        check(early == 2, f"{out}: beside a living run the second starter ends with {early}, expected 2")
     everyone = [(pid, is_rank) for pid, is_rank in place.processes(out) if pid != second.pid]
     chosen = [pid for pid, is_rank in everyone if is_rank or victim in ("mpirun", "machine")]
     if victim == "mpirun":
@@ -119,6 +119,13 @@ def kill_once(place, scene, out, rng, record):
     place.gone(out)
     with open(place(out + ".said")) as f:
         said = f.read()
+    if early is not None and alive:
+        # A living process need not be the owner yet (mpirun is slow to start) or still (it lingers): then the second may do the whole run,
+        # before the first finds nothing left to do, after it has found the same, or from new beside results moved away. Never both.
+        both = stepped(said) and stepped(words) and "the old results are now in" not in words
+        fine = early == 2 or early == 0 and not both
+        check(fine, f"{out}: the second starter ended with {early} beside a living run: {words.strip()[-300:]}; the first: {said[-300:]}")
+        record["second_starters_that_did_it_all_beside_a_living_process"] += early == 0
     if had:
         check("no checkpoint in" not in said, f"{out}: with a checkpoint there it is never started from the beginning")
     record["resumed_from_previous"] += len(re.findall("Going back to", said))
@@ -136,6 +143,12 @@ def kill_once(place, scene, out, rng, record):
     for what, so in lies.items():
         record[what] += so
     return True
+
+
+def stepped(said):
+    """Whether a run says that it made steps."""
+    made = re.search(r"^(\d+) steps in ", said, re.MULTILINE)
+    return bool(made and int(made[1]))
 
 
 def changed(path, since):
