@@ -401,7 +401,7 @@ private:
             // rho (g/xi) v_t^2 on the faces' area
             const double drag =
                 counts ? -s * at(w.dragging, k) * at(rho, k) * (dot(slides, slides) - dot(slides, normal) * dot(slides, normal)) : 0;
-            const auto f = return_to_coulomb(slip[i], in.dt * slides, normal, most + drag, m.shear * area / (0.5 * h_));
+            const auto f = return_to_coulomb(slip[i], in.dt * slides, normal, most + drag, spring_stiffness(m.shear, area, h_));
             slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
             const Vector all = counts ? push + f.force : f.force;
             out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;

@@ -28,6 +28,12 @@ template <class V> KUZURE_INLINE Lag<V> lag(double dt, V c_p, double h)
     return {keep, passing * keep};
 }
 
+/// Stiffness (1/s^2) of the spring, the soil's own shear modulus (Pa) across half a smoothing length (m), on an area (m^2) of a unit of
+/// mass.
+inline double spring_stiffness(double shear, double area, double h) { return shear * area / (0.5 * h); }
+/// The slip (m) with which it carries a shear stress (Pa) along the face.
+inline Vector slip_under(Vector stress, double shear, double h) { return (0.5 * h / shear) * stress; }
+
 /// `moved`: displacement of the step (m); `normal`: of the surface; `limit`: the largest friction (m/s^2);
 /// `stiffness`: of the spring (1/s^2).
 inline Friction return_to_coulomb(Vector slip, Vector moved, Vector normal, double limit, double stiffness)
