@@ -1,7 +1,6 @@
 #include "solver/run/layout.hpp"
 #include "solver/run/blocks.hpp"
 #include "solver/scene/motion.hpp"
-#include <limits>
 
 namespace kuzure {
 
@@ -98,24 +97,12 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
 void Layout::renew_walls(const Particles& p, PairModel& model)
 {
     if (scene_.walls.empty() || p.size() == 0) return;
-    const auto x = p[field::sorted_position];
-    const double all = std::numeric_limits<double>::max();
-    Vector lo{all, all, all}, hi{-all, -all, -all};
-    for (Index i = 0; i < p.size(); ++i) {
-        const Vector a = x[i];
-        lo = {std::min(lo.x, a.x), std::min(lo.y, a.y), std::min(lo.z, a.z)};
-        hi = {std::max(hi.x, a.x), std::max(hi.y, a.y), std::max(hi.z, a.z)};
-    }
-    const auto inside = [](const scene::Box& a, const scene::Box& b) {
-        return a.low.x >= b.low.x && a.low.y >= b.low.y && a.low.z >= b.low.z && a.high.x <= b.high.x && a.high.y <= b.high.y &&
-               a.high.z <= b.high.z;
-    };
-    const Vector margin{reach_, reach_, reach_}, ahead = 3.0 * margin;
+    const Cover needed(p, 2 * list_reach(scene_), reach_);
     std::vector<scene::Pose> poses;
     for (const int w : moving_) poses.push_back(scene_.walls[std::size_t(w)].pose);
-    if (wall_region_ && inside({lo - margin, hi + margin}, *wall_region_) && poses == moved_poses_) return;
+    if (near_soil_ && near_soil_->holds(needed) && poses == moved_poses_) return;
     moved_poses_ = std::move(poses);
-    wall_region_ = scene::Box{lo - margin - ahead, hi + margin + ahead};
+    near_soil_.emplace(p, 2 * list_reach(scene_), 4 * reach_);
     walls_.assign(scene_.walls.size(), {});
     for (std::size_t w = 0; w < walls_.size(); ++w) walls_[w].wall = int(w);
     // Walls repeat with the period as the soil does.
@@ -125,10 +112,14 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
         for (int b = -py; b <= py; ++b)
             for (int c = -pz; c <= pz; ++c) {
                 const Vector shift{a * step.x, b * step.y, c * step.z};
-                filling_.for_each_wall_in({wall_region_->low - shift, wall_region_->high - shift}, [&](std::int64_t id, Vector at, int w) {
-                    if (!scene_.walls[std::size_t(w)].present || std::ranges::count(moving_, w) > 0) return;
-                    walls_[w].x.push_back(at.x + shift.x), walls_[w].y.push_back(at.y + shift.y), walls_[w].z.push_back(at.z + shift.z);
-                    walls_[w].id.push_back(id);
+                near_soil_->for_each([&](Cover::Square square, const scene::Box& box) {
+                    filling_.for_each_wall_in({box.low - shift, box.high - shift}, [&](std::int64_t id, Vector drawn, int w) {
+                        const Vector at = drawn + shift;
+                        if (!scene_.walls[std::size_t(w)].present || std::ranges::count(moving_, w) > 0) return;
+                        if (near_soil_->square_of(at) != square) return;
+                        walls_[w].x.push_back(at.x), walls_[w].y.push_back(at.y), walls_[w].z.push_back(at.z);
+                        walls_[w].id.push_back(id);
+                    });
                 });
             }
     for (const int w : moving_)
@@ -143,7 +134,6 @@ void Layout::add_moved_points(int wall)
     const scene::Wall& own = scene_.walls[std::size_t(wall)];
     const Vector step = period(scene_);
     const int px = scene_.space.periodic[0], py = scene_.space.periodic[1], pz = scene_.space.periodic[2];
-    const auto& region = *wall_region_;
     // Where a fixed wall is, or one that moves and has a lower number, its points are enough.
     const auto taken = [&](Vector x) {
         for (int w = 0; w < int(scene_.walls.size()); ++w) {
@@ -161,9 +151,7 @@ void Layout::add_moved_points(int wall)
             for (int b = -py; b <= py; ++b)
                 for (int c = -pz; c <= pz; ++c) {
                     const Vector at = x + Vector{a * step.x, b * step.y, c * step.z};
-                    if (at.x < region.low.x || at.y < region.low.y || at.z < region.low.z || at.x > region.high.x || at.y > region.high.y ||
-                        at.z > region.high.z)
-                        continue;
+                    if (!near_soil_->holds(at)) continue;
                     to.x.push_back(at.x), to.y.push_back(at.y), to.z.push_back(at.z), to.id.push_back(id);
                 }
     });

@@ -4,6 +4,7 @@
 #include "decomposition/domain.hpp"
 #include "perf/phases.hpp"
 #include "solver/kernels/pair_model.hpp"
+#include "solver/run/cover.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
 #include <functional>
@@ -18,7 +19,7 @@ public:
     /// True where a particle may have moved further since the last sort than the lists allow (squared displacement, m^2).
     bool outgrown(double displacement2) const;
     /// Other walls or particles: nothing of what was built holds any more, nor that particles are those of the lists.
-    void forget() { built_ = false, wall_region_.reset(); }
+    void forget() { built_ = false, near_soil_.reset(); }
     /// Positions and origins of what left a period are taken back into it.
     void wrap_into_period(Particles&) const;
     /// The present positions are where particles are sorted from now on.
@@ -65,7 +66,7 @@ private:
     std::optional<Halo> halo_;
     ClusterLists lists_;
     std::vector<WallPoints> walls_;
-    std::optional<scene::Box> wall_region_;
+    std::optional<Cover> near_soil_;       // where wall points were made
     std::vector<int> moving_;              // walls that events move
     std::vector<scene::Pose> moved_poses_; // for which walls are as they are
     std::int64_t wall_renewals_ = 0;
