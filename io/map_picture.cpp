@@ -62,6 +62,12 @@ View view_of(const MapPicture& m)
                         high_y = std::max(high_y, p[1]);
     if (low_x > high_x)
         low_x = g.x, low_y = g.y, high_x = g.x + std::max(1, g.columns) * g.cell, high_y = g.y + std::max(1, g.rows) * g.cell;
+    // A house that is just missed belongs to the picture.
+    const double size = std::max(high_x - low_x, high_y - low_y), x0 = low_x, x1 = high_x, y0 = low_y, y1 = high_y;
+    for (const auto& p : m.points) {
+        if (std::max({x0 - p.x, p.x - x1, y0 - p.y, p.y - y1}) > 0.5 * size) continue;
+        low_x = std::min(low_x, p.x), high_x = std::max(high_x, p.x), low_y = std::min(low_y, p.y), high_y = std::max(high_y, p.y);
+    }
     // Some of what is around; no map is a strip.
     const double margin = 0.12 * std::max(high_x - low_x, high_y - low_y) + g.cell;
     low_x -= margin, low_y -= margin, high_x += margin, high_y += margin;
@@ -182,6 +188,20 @@ void draw_outlines(Canvas& canvas, const MapPicture& m, const View& v)
                 }
 }
 
+void draw_points(Canvas& canvas, const MapPicture& m, const View& v)
+{
+    for (const auto& p : m.points) {
+        if (p.x < v.low_x || p.x > v.high_x || p.y < v.low_y || p.y > v.high_y) continue;
+        const double x = v.px(p.x), y = v.py(p.y), wide = Canvas::text_width(14, p.name);
+        // Its name beside it, on the side where there is room.
+        const bool after = x + 12 + wide < left + v.width;
+        canvas.ring(x, y, 6, 2.5, {255, 255, 255});
+        canvas.ring(x, y, 5, 2, ink);
+        canvas.rectangle(after ? x + 9 : x - 13 - wide, y - 9, wide + 4, 18, plain);
+        canvas.text(after ? x + 11 : x - 11, y, 14, p.name, ink, after ? Anchor::Left : Anchor::Right);
+    }
+}
+
 /// Round coordinates with the digits that tell them apart.
 std::string coordinate(double x, double step)
 {
@@ -262,6 +282,7 @@ std::string map_png(const MapPicture& m)
     draw_cells(canvas, m, v, scale);
     draw_heights(canvas, m, v);
     draw_outlines(canvas, m, v);
+    draw_points(canvas, m, v);
     draw_axes(canvas, v);
     draw_scale_bar(canvas, v);
     draw_north(canvas, v);

@@ -471,3 +471,18 @@ TEST(MapPictures, ShowTheHeightsOfTheGroundAsLines)
     EXPECT_GT(half, 500) << "where there are heights";
     EXPECT_LT(half, 0.7 * slope) << "and nowhere else";
 }
+
+TEST(MapPictures, ShowNamedPointsOnTheMapAndJustBeside)
+{
+    io::MapPicture m{io::map_kinds[0], "houses", {1000, 500, 10, 20, 16, std::vector<double>(320, 2.0)}};
+    const auto plain = io::map_png(m);
+    m.points = {{"far away", 1600, 500}, {"below", 1100, 380}};
+    EXPECT_EQ(io::map_png(m), plain) << "more than half of the map's size beyond it";
+    m.points = {{"mill", 1100, 570}};
+    const auto inside = io::map_png(m);
+    EXPECT_NE(inside, plain);
+    EXPECT_EQ(decoded(inside).width, decoded(plain).width) << "the map is as large as before";
+    m.points = {{"school", 1250, 570}};
+    EXPECT_GT(decoded(io::map_png(m)).width, decoded(plain).width - 1) << "a house that is missed";
+    EXPECT_LT(decoded(io::map_png(m)).height, decoded(plain).height) << "the map shows more of x";
+}

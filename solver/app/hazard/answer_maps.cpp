@@ -313,13 +313,14 @@ Outlines write_outlines(const io::Raster& probability, const std::string& crs, c
     return outlines;
 }
 
-void draw_maps(const Base& base, const Layers& from, const scene::MapGrid& grid, const Outlines& outlines, const io::Place& folder)
+void draw_maps(const Base& base, const Layers& from, const scene::MapGrid& grid, const Outlines& outlines,
+               const std::vector<io::NamedPoint>& points, const io::Place& folder)
 {
     const auto& crs = base.scene.map_frame.crs;
     const scene::HeightField* ground = scene::ground_of(base.scene);
     for (const auto which : {from.reach, from.arrival + 1, from.thickness + 2}) {
         const auto& l = from.all[which];
-        io::MapPicture picture{l.kind, base.scene.title, cropped(raster_of(grid, crs, l.values).grid), {}, outlines};
+        io::MapPicture picture{l.kind, base.scene.title, cropped(raster_of(grid, crs, l.values).grid), {}, outlines, false, points};
         if (ground)
             picture.ground = [&, ground](double x, double y) {
                 return ground->at(x - base.scene.map_frame.x, y - base.scene.map_frame.y).z;
@@ -359,7 +360,7 @@ void write_maps(const Base& base, Answer& answer, const std::vector<io::NamedPoi
     const io::Place folder = io::hold(directory / "maps");
     write_layers(layers, grid, crs, folder);
     const auto outlines = write_outlines(raster_of(grid, crs, layers.all[layers.reach].values), crs, folder, answer);
-    if (io::can_draw()) draw_maps(base, layers, grid, outlines, folder);
+    if (io::can_draw()) draw_maps(base, layers, grid, outlines, points, folder);
     io::sync(folder);
     if (!answer.points.empty()) write_points(answer, directory);
 }

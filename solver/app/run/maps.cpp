@@ -348,7 +348,8 @@ void Maps::write_pictures(const io::Place& folder, const std::vector<MapCell>& c
                                    cells, record_.grid(), nan,
                                    name == "h_max" ? [](const MapCell& c) { return reached(c) ? c.memory.thickness : nan; }
                                                    : [](const MapCell& c) { return reached(c) ? c.memory.arrival : nan; }),
-                               .outlines = outlines};
+                               .outlines = outlines,
+                               .points = points_};
         picture.values.x += scene_.map_frame.x, picture.values.y += scene_.map_frame.y;
         if (ground)
             picture.ground = [&, ground](double x, double y) { return ground->at(x - scene_.map_frame.x, y - scene_.map_frame.y).z; };
