@@ -57,6 +57,15 @@ public:
             if (in > 0) visit(Stack{x, y, foot, top});
         });
     }
+    /// Calls visit(local id, position) for the points that show: those of a release, of the ground its surface, 2.5 spacings deep along
+    /// its normal so that slopes have no holes. By rising id.
+    template <class Visit> void for_each_shown(Visit visit) const
+    {
+        for_each_column_in(bounds_, [&](std::int64_t first, double x, double y, double surface, std::int64_t n) {
+            for (std::int64_t k = below_ ? std::max<std::int64_t>(0, n - shown_deep(x, y)) : 0; k < n; ++k)
+                visit(first + k, Vector{x, y, height(surface, k, n)});
+        });
+    }
     bool has_column(std::int64_t i, std::int64_t j) const
     {
         if (i < i0_ || j < j0_ || i >= i0_ + columns_ || j >= j0_ + rows_) return false;
@@ -73,6 +82,12 @@ private:
     {
         if (plain_) return (std::floor(surface / spacing_ - 0.5) + double(k - n) + 1.5) * spacing_;
         return surface + (double(below_ ? k - n : k) + 0.5) * spacing_;
+    }
+    /// How many points of a column of the ground lie within 2.5 spacings of its surface.
+    std::int64_t shown_deep(double x, double y) const
+    {
+        const auto p = field_->at(x, y);
+        return std::int64_t(std::ceil(2.5 * std::sqrt(1 + p.dz_dx * p.dz_dx + p.dz_dy * p.dz_dy) - 0.5 - 1e-9)) + (plain_ ? 1 : 0);
     }
     double at(std::int64_t i) const { return (double(i) + 0.5) * spacing_; }
     /// Calls visit(first id, x, y, height of the surface, points) for the columns over a region in plan.

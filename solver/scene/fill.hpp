@@ -41,6 +41,11 @@ public:
     {
         std::visit([&](const auto& p) { p.for_each_in(region, visit); }, of_);
     }
+    template <class Visit> void for_each_shown(Visit visit) const
+    {
+        if (const auto* d = draped()) return d->for_each_shown(visit);
+        for (std::int64_t k = 0; k < size(); ++k) visit(k, position(k));
+    }
     template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const
     {
         std::visit([&](const auto& p) { p.for_each_stack_in(region, visit); }, of_);
@@ -98,6 +103,21 @@ public:
     {
         const Points& points = points_[n_bodies_ + std::size_t(wall)];
         for (std::int64_t k = 0; k < points.size(); ++k) visit(first_id_[n_bodies_ + std::size_t(wall)] + k, points.position(k));
+    }
+    /// Calls visit(std::int64_t id, Vector x) for the wall particles that pictures and snapshots show, as drawn, by rising id: all but
+    /// those deep in real ground.
+    template <class Visit> void for_each_shown_wall(Visit visit) const
+    {
+        for (std::size_t w = n_bodies_; w < points_.size(); ++w)
+            points_[w].for_each_shown([&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x); });
+    }
+    std::int64_t shown_wall_count() const
+    {
+        std::int64_t n = 0;
+        for (std::size_t w = n_bodies_; w < points_.size(); ++w)
+            if (points_[w].draped()) points_[w].for_each_shown([&](std::int64_t, Vector) { ++n; });
+            else n += points_[w].size();
+        return n;
     }
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;

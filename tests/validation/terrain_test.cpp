@@ -3,6 +3,7 @@
 #include "solver/walls/surface.hpp"
 #include "tests/validation/terrain.hpp"
 #include <gmock/gmock.h>
+#include <map>
 
 using namespace kuzure;
 using namespace kuzure::validation;
@@ -155,6 +156,37 @@ TEST(Terrain, ParticlesStandOnTheGroundWithItsVolume)
     const scene::Lattice plain(scene::Polygon{{{0, 0}, {4, -4}, {4, -3.3}, {0, 0.7}}, {0.0, 4.0}}, dx, 3);
     EXPECT_FALSE(
         c.control("volume on the plain lattice, 45 deg, 0.7 m thick", 4 * 4 * 0.7, double(plain.size()) * dx * dx * dx, "m^3", 0.005));
+}
+
+TEST(Terrain, WhatShowsOfTheGroundIsItsSurfaceWithoutHoles)
+{
+    // Level, then ever steeper to 60 degrees.
+    GroundScene g = block(0, 20);
+    g.ground = heights([](double x, double) { return x < 0 ? 0 : 0.045 * x * x; }, {-20, -10}, {20, 10}, 0.5);
+    const scene::HeightField field(g.ground);
+    const double dx = g.text.spacing, depth = scene::ground_depth(field, 2 * 1.3 * dx);
+    const scene::Draped points(scene::Ground{std::make_shared<scene::HeightField>(field), depth}, dx);
+    std::map<std::pair<double, double>, std::pair<double, double>> columns; // lowest and highest of each
+    std::int64_t last = -1, n = 0;
+    points.for_each_shown([&](std::int64_t id, Vector x) {
+        ASSERT_GT(id, last) << "by rising id";
+        const Vector same = points.position(id);
+        ASSERT_TRUE(same.x == x.x && same.y == x.y && same.z == x.z);
+        auto& c = columns.try_emplace({x.x, x.y}, x.z, x.z).first->second;
+        c.first = std::min(c.first, x.z), c.second = std::max(c.second, x.z);
+        last = id, ++n;
+    });
+    EXPECT_LT(n, points.size() / 2) << "not all that soil feels";
+    for (const auto& [at, c] : columns) {
+        const double surface = field.at(at.first, at.second).z;
+        EXPECT_NEAR(c.second, surface - 0.5 * dx, 1e-9);
+        EXPECT_LE(c.first, surface - 1.5 * dx + 1e-9) << "two layers at least";
+        const auto beside = columns.find({at.first - dx, at.second}); // lower: its top reaches this column's foot
+        if (beside != columns.end()) EXPECT_GT(beside->second.second + dx, c.first) << "a hole in the slope at x = " << at.first;
+    }
+    std::int64_t all = 0;
+    points.for_each_in(points.bounds(), [&](std::int64_t, Vector) { ++all; });
+    EXPECT_EQ(all, points.size()) << "control: the layer that soil feels";
 }
 
 TEST(Terrain, BlockSlidesDownHoweverTheGridLies)

@@ -20,6 +20,7 @@ Estimate finer(Estimate e, double factor)
 {
     const double cube = factor * factor * factor;
     e.soil = std::llround(double(e.soil) * cube), e.walls = std::llround(double(e.walls) * cube);
+    e.shown = std::llround(double(e.shown) * cube);
     e.steps = std::max<std::int64_t>(1, std::llround(double(e.steps) * factor)), e.dt /= factor;
     e.pairs *= cube * factor, e.longest *= factor, e.columns *= factor * factor;
     return e;

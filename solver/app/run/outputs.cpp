@@ -11,17 +11,17 @@ namespace kuzure {
 
 namespace {
 
-/// This rank's even share of all wall particles, for snapshots and pictures.
+/// This rank's even share of the wall particles that show, for snapshots and pictures.
 io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const Material& first_soil)
 {
     io::WallPoints w;
-    const std::int64_t n = f.wall_count(), first = f.soil_count();
+    const std::int64_t n = f.shown_wall_count();
     const std::int64_t begin = n * comm.rank() / comm.size(), end = n * (comm.rank() + 1) / comm.size();
-    for (std::int64_t k = begin; k < end; ++k) {
-        w.position.push_back(f.wall_position(first + k));
-        w.id.push_back(first + k);
-        w.density.push_back(first_soil.density);
-    }
+    std::int64_t k = 0;
+    f.for_each_shown_wall([&](std::int64_t id, Vector x) {
+        if (k >= begin && k < end) w.position.push_back(x), w.id.push_back(id), w.density.push_back(first_soil.density);
+        ++k;
+    });
     return w;
 }
 

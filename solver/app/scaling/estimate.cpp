@@ -54,7 +54,7 @@ double neighbours_at_start(const Scene& s, const scene::Filling& f)
 Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& model)
 {
     Estimate e{};
-    e.soil = f.soil_count(), e.walls = f.wall_count();
+    e.soil = f.soil_count(), e.walls = f.wall_count(), e.shown = f.shown_wall_count();
     double c = 0;
     for (const auto& soil : s.soils) c = std::max(c, Material::from(soil).c_p);
     const double h = s.smoothing_length();
@@ -79,13 +79,13 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     e.columns = across(box.low.x, box.high.x) * (s.dimensions == 3 ? across(box.low.y, box.high.y) : 1);
     e.longest =
         std::max({box.high.x - box.low.x, s.dimensions == 3 ? box.high.y - box.low.y : 0.0, box.high.z - box.low.z}) / s.space.spacing;
-    e.memory = 12 * e.columns + columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.walls);
+    e.memory = 12 * e.columns + columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.shown);
     // Outputs come at steps: never more of them than steps.
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };
     e.snapshots = s.output.every ? times(*s.output.every) + 2 : 2;
     e.snapshot = double(io::snapshot_bytes(e.soil, s.output.fields));
-    if (scene::walls_change(s)) e.snapshot += double(io::snapshot_bytes(e.walls, s.output.fields));
-    e.wall_files = e.walls > 0 ? 2 * double(io::snapshot_bytes(e.walls, s.output.fields)) : 0;
+    if (scene::walls_change(s)) e.snapshot += double(io::snapshot_bytes(e.shown, s.output.fields));
+    e.wall_files = e.shown > 0 ? 2 * double(io::snapshot_bytes(e.shown, s.output.fields)) : 0;
     e.checkpoint = double(io::checkpoint_bytes(e.soil, std::size_t(columns / std::max<double>(1, double(e.soil)))));
     e.history_rows = s.output.history ? times(*s.output.history) + 1 : 1;
     e.history = e.history_rows * 320;

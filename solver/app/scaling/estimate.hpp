@@ -11,13 +11,14 @@ namespace kuzure {
 
 struct Estimate {
     std::int64_t soil, walls, steps;
-    double dt;         // s
-    double memory;     // bytes of all ranks together, but for what every process takes to begin with
-    double snapshot;   // bytes of one: soil
-    double wall_files; // bytes of the walls in the first snapshot and in walls.hdf
-    double checkpoint; // bytes of one
-    double snapshots;  // how many
-    double history;    // bytes
+    std::int64_t shown; // wall particles of which a rank has its share for snapshots
+    double dt;          // s
+    double memory;      // bytes of all ranks together, but for what every process takes to begin with
+    double snapshot;    // bytes of one: soil
+    double wall_files;  // bytes of the walls in the first snapshot and in walls.hdf
+    double checkpoint;  // bytes of one
+    double snapshots;   // how many
+    double history;     // bytes
     double history_rows;
     double pairs;      // directed pairs of all steps, each once a step
     double step_price; // of a step, in those of the one-pass scheme over the same soil
