@@ -10,6 +10,7 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 
 program = os.path.abspath(sys.argv[1])
 root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -40,6 +41,26 @@ def scratch(name):
     directory = tempfile.mkdtemp(prefix=f"kuzure-{name}-")
     atexit.register(shutil.rmtree, directory, ignore_errors=True)
     return directory
+
+
+def wait_for(condition, seconds=600, every=0.005, process=None):
+    """Whether the condition came to hold: before the process ended, where one is given that may end without it. So long that no machine is
+    too slow for what takes a second on an idle one."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end or (process is not None and process.poll() is not None):
+            return condition()
+        time.sleep(every)
+    return True
+
+
+def legs(seconds):
+    """Values for --max-minutes, for one start after the other of a run that took `seconds` here in one go: the first start ends with its
+    first step, those after it come further and further, until one comes to the end. So the run is stopped at least once, and mostly some
+    times on its way, also where the machine is by now several times faster or slower than it was."""
+    yield "1e-9"
+    for k in range(60):
+        yield f"{seconds / 60 / 20 * 1.7**k:.9f}"
 
 
 def digest(where, files):

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 
-from harness import check, finish, program
+from harness import check, finish, legs, program, wait_for
 
 
 def run_parts(*parts):
@@ -73,7 +73,7 @@ class Runs:
     def scene(self, name, text):
         return self.write(name + ".toml", text)
 
-    def call(self, *args, expect=0, says=(), timeout=300):
+    def call(self, *args, expect=0, says=(), timeout=600):
         """The program in this directory."""
         done = subprocess.run([program, *args], capture_output=True, text=True, timeout=timeout, cwd=self.work)
         good = done.returncode == expect and all(word in done.stderr for word in says)
@@ -92,6 +92,31 @@ class Runs:
             half.send_signal(signals[k % len(signals)])
             codes.append(half.wait())
         return codes
+
+    def stop(self, args, out, ready, tries=20):
+        """Starts the program with -o, and sends it SIGTERM as soon as ready(directory): the exit code, what it said, and the directory. Where
+        it has come to its end before it heard that, again in another directory: this process may have been away for any time."""
+        for k in range(tries):
+            there = f"{out}{k or ''}"
+            with open(self.path(there + ".said"), "w") as said:
+                process = subprocess.Popen([program, *args, "-o", there], stdout=said, stderr=said, cwd=self.work)
+                wait_for(lambda: ready(self.path(there)), every=0.001, process=process)
+                process.send_signal(signal.SIGTERM)
+                code = process.wait(300)
+            if code != 0:
+                break
+        return code, self.read(there + ".said"), there
+
+    def in_legs(self, path, out, seconds):
+        """A run that took `seconds` in one go, in legs that the clock ends, on one rank and on two in turn: the summary after each."""
+        ends = []
+        for minutes in legs(seconds):
+            done = self.run(path, out, 1 + len(ends) % 2, extra=["--restart", "--max-minutes", minutes], expect=None)
+            ends.append(json.loads(self.read(out, "summary.json") or "{}"))  # none where it was stopped while the soil settled
+            if done.returncode != 5:
+                check(done.returncode == 0, f"{out}: leg {len(ends)} ends with exit {done.returncode} {done.stderr.strip()[-400:]}")
+                break
+        return ends
 
     def run(self, path, out, ranks=1, threads=1, extra=(), expect=0):
         command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []

@@ -16,7 +16,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 
 def call(*args, expect=0, launcher=(), says=(), silent_of=(), **env):
-    done = subprocess.run([*launcher, program, *args], capture_output=True, timeout=120, cwd=work, env={**os.environ, **env})
+    done = subprocess.run([*launcher, program, *args], capture_output=True, timeout=300, cwd=work, env={**os.environ, **env})
     done.stdout, done.stderr = done.stdout.decode(), done.stderr.decode()  # as they are: text=True would make line ends of a bar's returns
     wrong = [w for w in says if w not in done.stderr + done.stdout] + [f"not {w}" for w in silent_of if w in done.stderr + done.stdout]
     good = done.returncode == expect and not wrong and "defect" not in done.stderr
@@ -52,7 +52,7 @@ def main():
     write("s.toml", SCENE)
     # ---- commands that compute nothing, and a run on one process, need no MPI
     control = subprocess.run(
-        [*two, program, "run", "s.toml", "-o", "control"], capture_output=True, cwd=work, env={**os.environ, **broken}, timeout=120
+        [*two, program, "run", "s.toml", "-o", "control"], capture_output=True, cwd=work, env={**os.environ, **broken}, timeout=300
     )
     check(control.returncode != 0, "the broken MPI does break a run on ranks")
     call("--help", says=["Usage: kuzure", "run", "check"], **broken)
@@ -124,7 +124,7 @@ def main():
     # ---- ranks that were given different things: exit 2 on all, named, and no rank waits for another
     def mpmd(first, second, *says):
         done = subprocess.run(
-            ["mpirun", "-n", "1", program, *first, ":", "-n", "1", program, *second], capture_output=True, text=True, timeout=60, cwd=work
+            ["mpirun", "-n", "1", program, *first, ":", "-n", "1", program, *second], capture_output=True, text=True, timeout=300, cwd=work
         )
         wrong = [w for w in says if w not in done.stderr]
         check(
@@ -146,7 +146,7 @@ def main():
         ["mpirun", "-n", "1", program, *plain, "--threads", "1", ":", "-n", "1", program, *plain, "--threads", "2"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         cwd=work,
     )
     check(done.returncode == 0, f"threads may differ: exit {done.returncode} {done.stderr[-300:]}")
@@ -168,7 +168,7 @@ def main():
             if not data:
                 break
             out += data
-        process.wait(60)
+        process.wait(300)
         os.close(parent)
         return out.decode().replace("\r\n", "\n")
 

@@ -60,7 +60,7 @@ def main():
             if command.startswith(("export ", "source ")):
                 exports += command + "\n"
                 continue
-            done = subprocess.run(["bash", "-c", exports + command], capture_output=True, text=True, cwd=work, env=environment, timeout=300)
+            done = subprocess.run(["bash", "-c", exports + command], capture_output=True, text=True, cwd=work, env=environment, timeout=800)
             good = next((codes for words, codes in CODES.items() if words in command), {0})
             check(
                 done.returncode in good,

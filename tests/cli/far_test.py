@@ -46,7 +46,7 @@ def run(work, scene, out, ranks):
         capture_output=True,
         text=True,
         cwd=work,
-        timeout=120,
+        timeout=300,
         preexec_fn=little,
     )
 

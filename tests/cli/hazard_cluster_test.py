@@ -100,7 +100,7 @@ for name in ("slurm", "pbs"):
         text = re.sub(r"^cores = \d+", "cores = 2", f.read(), flags=re.M)
     write(f"{name}.toml", re.sub(r" --map-by ppr:\{per_node\}:node:PE=\{threads\}| OMP_PROC_BIND=close OMP_PLACES=cores", "", text))
 
-call("hazard", scene, "-o", "alone", *RUNS, "--within", "200s")
+call("hazard", scene, "-o", "alone", *RUNS, "--within", "1h")
 want = harness.digest(os.path.join(work, "alone"), ())
 
 
@@ -109,7 +109,7 @@ def bash(script, spool, **more):
         ["bash", os.path.join(work, script)],
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=600,
         cwd=work,
         env=dict(env, SPOOL=os.path.join(work, spool), KUZURE=hasty, **more),
     )

@@ -15,7 +15,7 @@ os.environ.update(OMP_NUM_THREADS="1", KUZURE_MPI="0")
 
 
 def call(*args, expect=0, says=(), cwd=work, command=None):
-    done = subprocess.run([*(command or [program]), *args], capture_output=True, text=True, timeout=60, cwd=cwd)
+    done = subprocess.run([*(command or [program]), *args], capture_output=True, text=True, timeout=300, cwd=cwd)
     wrong = [w for w in says if w not in done.stderr]
     good = done.returncode == expect and not wrong and "defect" not in done.stderr
     check(
@@ -158,7 +158,7 @@ def main():
             capture_output=True,
             text=True,
             cwd=work,
-            timeout=120,
+            timeout=300,
         )
         wrong = [w for w in says if w not in done.stderr]
         check(

@@ -141,9 +141,9 @@ def submit(machine, out, command, program, minutes="5", **more):
     )
     write(f"{out}.sh", text)
     environment = dict(env, KUZURE=program, PJSUB_SPOOL=os.path.join(work, out + " spool"), **more)
-    done = subprocess.run([*command, f"{out}.sh"], capture_output=True, text=True, timeout=120, cwd=work, env=environment)
+    done = subprocess.run([*command, f"{out}.sh"], capture_output=True, text=True, timeout=300, cwd=work, env=environment)
     if "bash" in command:
-        subprocess.run(["pjsub", "--run"], timeout=120, cwd=work, env=environment)
+        subprocess.run(["pjsub", "--run"], timeout=300, cwd=work, env=environment)
     logs = sorted(glob.glob(os.path.join(glob.escape(work), "*.o1*")), key=lambda f: int(f.rsplit(".o", 1)[1]))
     said = [open(f).read() for f in logs]
     codes = [open(f).read().split()[0][3:] for f in sorted(glob.glob(os.path.join(glob.escape(work), "*.stats")))]
@@ -159,7 +159,7 @@ def summary(out):
 def run_pbs(machine, out, command, program):
     shutil.rmtree(os.path.join(work, "pbs"), ignore_errors=True)
     write(f"{out}.sh", job(scene, "--machine", f"./{machine}.toml", "--nodes", "2", "--ranks-per-node", "1", "--minutes", "5", "-o", out))
-    started = subprocess.run([*command, f"{out}.sh"], capture_output=True, text=True, timeout=60, cwd=work, env=pbs_env)
+    started = subprocess.run([*command, f"{out}.sh"], capture_output=True, text=True, timeout=300, cwd=work, env=pbs_env)
     check(started.returncode == 0, f"{out}: submitted {started.stdout} {started.stderr}")
     codes, said, k = {}, "", 1
     while os.path.exists(os.path.join(work, f"pbs/{k}.sh")):
@@ -169,7 +169,7 @@ def run_pbs(machine, out, command, program):
                 ["bash", os.path.join(work, f"pbs/{k}.sh")],
                 capture_output=True,
                 text=True,
-                timeout=120,
+                timeout=300,
                 cwd=work,
                 env=dict(pbs_env, PBS_JOBID=str(k), KUZURE=program),
             )
@@ -360,7 +360,7 @@ def main():
     for name in ("oakforest-pacs", "fugaku"):
         text = open(os.path.join(root, f"jobs/machines/{name}.toml")).read()
         write(f"{name}.toml", re.sub(r"^cores = \d+", "cores = 1", text, flags=re.M))
-    subprocess.run([program, "run", scene, "-o", "undisturbed", "--threads", "1", "--quiet"], cwd=work, timeout=120, env=env)
+    subprocess.run([program, "run", scene, "-o", "undisturbed", "--threads", "1", "--quiet"], cwd=work, timeout=300, env=env)
     want = summary("undisturbed").get("state_hash")
     check(want is not None, "an undisturbed run")
     jobs_go_on(want, hasty)

@@ -103,16 +103,10 @@ def bits():
     run(path, "legs", 2, extra=["--restart", "--set", "time.end=0.15"])
     run(path, "legs", extra=["--restart"])
     check(summary("legs")["state_hash"] == one["state_hash"], "three legs: the bits of one run")
-    run(path, "stopped", extra=["--max-minutes", "0.0001"], expect=5)
-    steps = summary("stopped")["steps"]
-    for leg in range(200):
-        if (
-            runs.run(path, "stopped", 1 + leg % 2, extra=["--restart", "--max-minutes", f"{0.0015 * 1.2**leg:.4f}"], expect=None).returncode
-            == 0
-        ):
-            break
-    check(0 < steps < one["steps"], f"a run stopped after {steps} of {one['steps']} steps")
-    check(summary("stopped")["state_hash"] == one["state_hash"], f"and taken up {leg + 1} times: the bits of one run")
+    ends = runs.in_legs(path, "stopped", one["wall_seconds"])
+    steps = [e["steps"] for e in ends]
+    check(0 < steps[0] < one["steps"] and steps == sorted(set(steps)), f"a run stopped after {steps[:-1]} of {one['steps']} steps")
+    check(ends[-1]["state_hash"] == one["state_hash"], f"and taken up {len(ends) - 1} times: the bits of one run")
 
 
 def train():

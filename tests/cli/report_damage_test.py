@@ -31,7 +31,7 @@ def bounded():
 def report(what, name=None, expect=(0,)):
     begin = time.monotonic()
     try:
-        done = subprocess.run([program, "report", "r"], cwd=work, capture_output=True, text=True, timeout=60, preexec_fn=bounded)
+        done = subprocess.run([program, "report", "r"], cwd=work, capture_output=True, text=True, timeout=300, preexec_fn=bounded)
     except subprocess.TimeoutExpired:
         check(False, f"{what}: does not end")
         return

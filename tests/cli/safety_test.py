@@ -2,13 +2,13 @@
 """kuzure safety: a small slope's factor of safety is bracketed, scales with its strength, is the mirrored slope's, of any --jobs and after
 any kill; a stage of a scene with events; what lies outside the range; what is refused. Run as safety_test.py PROGRAM."""
 import csv
+import glob
 import math
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import check, finish, program, scratch
@@ -143,12 +143,8 @@ codes = runs.kill(("safety", slope, "-o", "killed", "--jobs", "1", *WIDE), 8, 0.
 check(all(c in (0, 5, -signal.SIGKILL, -signal.SIGTERM) for c in codes), f"killed: {codes}")
 call(slope, "-o", "killed", "--jobs", "1", *WIDE)
 check(table("killed") == before, "after eight kills: the same bytes of safety.csv")
-stopped = subprocess.Popen([program, "safety", slope, "-o", "stopped", *WIDE], stdout=subprocess.PIPE, text=True, cwd=work)
-stopped.stdout.readline()
-time.sleep(0.3)
-stopped.send_signal(signal.SIGTERM)
-said = stopped.communicate()[0]
-check(stopped.returncode == 5 and "goes on from here" in said, f"a stop: exit {stopped.returncode}")
+code, said, _ = runs.stop(("safety", slope, *WIDE), "stopped", lambda there: glob.glob(there + "/runs/*/history.csv"))
+check(code == 5 and "goes on from here" in said, f"a stop: exit {code}")
 
 # ---- outside the range
 above = call(slope, "-o", "above", "--to", "1.1", "--bracket", "0.2")

@@ -9,12 +9,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 from pathlib import Path
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from harness import block, program
+from runs import Runs
 
 SCENE = block(
     (0.8, 0, 0.8),
@@ -148,26 +148,18 @@ class Study(unittest.TestCase):
         self.assertEqual(bad.returncode, 2)
         self.assertIn("found one with other things in it", bad.stderr)
 
-    def test_a_stop_is_passed_on_and_the_study_goes_on_later(self):
-        (self.dir / "block.toml").write_text(SCENE.replace("end = 0.15", "end = 60.0"))
-        running = subprocess.Popen([program, "study", self.dir / "sweep.toml", "-o", self.dir / "out"], stdout=subprocess.PIPE, text=True)
-        limit = time.monotonic() + 60
-        while not list(self.dir.glob("out/points/*/run/history.csv")) and time.monotonic() < limit:
-            time.sleep(0.05)
-        running.terminate()
-        output, _ = running.communicate(timeout=60)
-        self.assertEqual(running.returncode, 5, output)
+    def stop(self, when):
+        """A study that is asked to stop once it has such a file says that it goes on from there."""
+        code, output, _ = Runs(str(self.dir)).stop(("study", "sweep.toml"), "out", lambda there: list(Path(there).glob(when)))
+        self.assertEqual(code, 5, output)
         self.assertIn("goes on from here", output)
 
+    def test_a_stop_is_passed_on_and_the_study_goes_on_later(self):
+        (self.dir / "block.toml").write_text(SCENE.replace("end = 0.15", "end = 600.0"))
+        self.stop("points/*/run/history.csv")
+
     def test_a_stop_between_two_points_is_heard_too(self):
-        running = subprocess.Popen([program, "study", self.dir / "sweep.toml", "-o", self.dir / "out"], stdout=subprocess.PIPE, text=True)
-        limit = time.monotonic() + 60
-        while not list(self.dir.glob("out/points/*/point.json")) and time.monotonic() < limit:
-            time.sleep(0.001)
-        running.terminate()
-        output, _ = running.communicate(timeout=60)
-        self.assertEqual(running.returncode, 5, output)
-        self.assertIn("goes on from here", output)
+        self.stop("points/*/point.json")
 
     def test_twins_give_error_bars_and_change_no_bit(self):
         plain = kuzure("run", self.dir / "block.toml", "-o", self.dir / "plain", "--quiet", "--threads", 1, "--set", "space.spacing=0.05")

@@ -13,7 +13,7 @@ X0, Y0, CELL, COLUMNS, ROWS = -1700.0, -12800.0, 2.0, 90, 70
 
 
 def call(*args, folder=work):
-    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=120, cwd=folder)
+    done = subprocess.run([program, *args], capture_output=True, text=True, timeout=300, cwd=folder)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -333,7 +333,7 @@ def main():
     check(hashed("out/scene.toml") == want, "and reads back to the same scene")
 
     launcher = ["mpirun", "-n", "2", program, "run", "s.toml", "-o", "two", "--threads", "1", "--set", "time.end=0.001"]
-    done = subprocess.run(launcher, capture_output=True, text=True, timeout=120, cwd=work)
+    done = subprocess.run(launcher, capture_output=True, text=True, timeout=300, cwd=work)
     states = [
         json.load(open(path(f"{d}/summary.json")))["state_hash"] if done.returncode == 0 else done.stderr[-500:] for d in ("out", "two")
     ]

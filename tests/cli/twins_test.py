@@ -6,10 +6,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import block, check, failures, finish, program, scratch
+from harness import block, check, failures, finish, legs, program, scratch, wait_for
 
 work = scratch("twins")
 os.environ["OMP_NUM_THREADS"] = "1"
@@ -37,7 +36,7 @@ def start(out, *args):
 
 
 def end(process, expect, what):
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=600)
     check(process.returncode == expect, f"{what}: exit {process.returncode}, expected {expect} {err[-300:]}")
     return out, err
 
@@ -49,46 +48,36 @@ def summary(path):
         return {}
 
 
-def wait_for(path, process):
-    for _ in range(2000):
-        if os.path.exists(f"{work}/{path}") or process.poll() is not None:
-            return
-        time.sleep(0.01)
-
-
 def main():
     with open(work + "/s.toml", "w") as f:
         f.write(SCENE)
-    began = time.monotonic()
     end(start("whole"), 0, "never stopped")
-    eighth = (time.monotonic() - began) / 480  # min
     whole = summary("whole")
     check({"run-out", "height", "peak speed"} <= set(whole.get("error_bars", {})), "it has error bars")
     # ---- legs by the clock: each must come further than the one before
-    legs, before = 0, -1
-    while legs < 60 and not failures:
-        legs += 1
-        # Longer by and by: on a slow machine, the first ones end with their first step.
-        process = start("legs", "--max-minutes", f"{eighth * 1.1**legs:.5f}")
-        out, err = process.communicate(timeout=120)
-        if process.returncode == 0:
+    count, before = 0, -1
+    for minutes in legs(sum(summary(d)["wall_seconds"] for d in ("whole/twins/x2", "whole/twins/x4", "whole"))):
+        count += 1
+        process = start("legs", "--max-minutes", minutes)
+        out, err = process.communicate(timeout=600)
+        if process.returncode == 0 or failures:
             break
-        check(process.returncode == 5, f"leg {legs}: exit {process.returncode} {err[-300:]}")
+        check(process.returncode == 5, f"leg {count}: exit {process.returncode} {err[-300:]}")
         done = sum(summary(d).get("time", 0) for d in ("legs/twins/x2", "legs/twins/x4", "legs"))
         check(
             done >= before and not os.path.exists(work + "/legs.old-1"),
-            f"leg {legs} came to {done:.3f} s in all, the one before to {before:.3f} s",
+            f"leg {count} came to {done:.3f} s in all, the one before to {before:.3f} s",
         )
-        check("checkpoint" in out and "--restart" in out, f"leg {legs} names a checkpoint")
+        check("checkpoint" in out and "--restart" in out, f"leg {count} names a checkpoint")
         before = done
-    check(legs > 2, f"it took {legs} legs")
-    legs = summary("legs")
-    check(legs.get("status") == "finished" and legs.get("state_hash") == whole["state_hash"], "in legs: the same bits")
+    check(count > 2, f"it took {count} legs")
+    last = summary("legs")
+    check(last.get("status") == "finished" and last.get("state_hash") == whole["state_hash"], "in legs: the same bits")
 
     def told(bars):
         return {**bars, "twins": [{k: v for k, v in t.items() if k != "wall_seconds"} for t in bars["twins"]]}
 
-    check(told(legs["error_bars"]) == told(whole["error_bars"]), "in legs: the same error bars, and the peak speed of all legs")
+    check(told(last["error_bars"]) == told(whole["error_bars"]), "in legs: the same error bars, and the peak speed of all legs")
     for twin in ("x2", "x4"):
         check(
             summary(f"legs/twins/{twin}").get("state_hash") == summary(f"whole/twins/{twin}").get("state_hash"),
@@ -96,15 +85,14 @@ def main():
         )
     # ---- STOP in the run's own directory, and a signal, while a twin runs
     for what in ("STOP", "signal"):
-        process = start(what, "--set", "time.end=80")  # STOP is looked for once a second: the twins must last longer
-        wait_for(f"{what}/twins/x2/history.csv", process)
+        # STOP is looked for once a second, and this process may be away for some: the first twin has millions of steps to make.
+        process = start(what, "--set", "time.end=8000", "--set", "output.history=100")
+        check(wait_for(lambda: os.path.exists(f"{work}/{what}/twins/x4/history.csv"), process=process), f"{what}: a twin runs")
         if what == "STOP":
             open(f"{work}/{what}/STOP", "w").close()
         else:
             process.send_signal(signal.SIGTERM)
-        began = time.monotonic()
         end(process, 5, f"{what} while a twin runs")
-        print(f"      after {time.monotonic() - began:.1f} s")
         check(
             summary(what).get("status") == "stopped" and os.path.exists(f"{work}/{what}/checkpoint.h5"),
             f"{what}: the run itself has a checkpoint",

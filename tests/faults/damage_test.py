@@ -105,7 +105,7 @@ def main():
             with open(place("wrong.toml"), "wb") as f:
                 f.write(wrong)
             done = place.run(
-                place("wrong.toml"), "wrong", "--set", "time.end=1e-4", "--max-minutes", "0.02", expect=(0, 2, 3, 5), timeout=120
+                place("wrong.toml"), "wrong", "--set", "time.end=1e-4", "--max-minutes", "0.02", expect=(0, 2, 3, 5), timeout=300
             )
             refused += done.returncode == 2
             check(done.returncode != 2 or "wrong.toml" in done.stderr, "a refusal names the file")

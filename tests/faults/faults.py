@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from harness import block, check, finish, program  # finish for those who take all from here
+from harness import block, check, finish, legs, program, wait_for  # the last ones for those who take all from here
 
 
 # The law of equal bits lets any run here be compared with any other by its hash.
@@ -144,15 +144,6 @@ def kill(pid, number):
         return True
     except ProcessLookupError:
         return False
-
-
-def wait_for(condition, seconds=60, every=0.005):
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(every)
-    return True
 
 
 def history(path):

@@ -128,7 +128,7 @@ def main():
             bad = place("bad.h5")
             forge(good, bad, change)
             for ranks in (1, 2) if k < 4 else (1 + k % 2,):
-                done = place.run(scene, "out", f"--restart={bad}", *longer, ranks=ranks, expect=4, timeout=60)
+                done = place.run(scene, "out", f"--restart={bad}", *longer, ranks=ranks, expect=4, timeout=300)
                 check(
                     bad in done.stderr and word in done.stderr,
                     f"{what}: the file is named, and what is wrong: {done.stderr.strip()[-250:]}",

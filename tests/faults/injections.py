@@ -44,7 +44,7 @@ class Campaign:
             self.place.command(self.scene, out, *more),
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=300,
             cwd=self.place.path,
             env={**self.environment, **environment},
         )

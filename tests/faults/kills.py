@@ -41,9 +41,12 @@ def campaign(kills, seed, kills_a_run=5):
         scene = place.write("scene.toml", scene_text(end=0.03, checkpoint=1e-6))
         place.run(place.write("calm.toml", scene_text(end=0.03)), "calm")
         record["state_hash"] = place.summary("calm")["state_hash"]
-        while record["kills"] < kills:
+        # Some kills must have fallen into a checkpoint write. How many of few do is chance, and smaller where the disk is fast and the cores
+        # are slow: then a few more.
+        lacking = lambda: kills >= 10 and record["during_a_checkpoint_write"] == 0 and record["kills"] < 5 * kills
+        while record["kills"] < kills or lacking():
             out = f"run{record['runs']}"
-            target = min(kills_a_run, kills - record["kills"])
+            target = min(kills_a_run, max(1, kills - record["kills"]))
             done = 0
             while done < target:
                 if kill_once(place, scene, out, rng, record):
@@ -73,8 +76,7 @@ def kill_once(place, scene, out, rng, record):
         # From the first new checkpoint on.
         wait_for(
             lambda: process.poll() is not None
-            or (os.path.exists(place(out, "checkpoint.h5")) and changed(place(out, "checkpoint.h5"), begun)),
-            60,
+            or (os.path.exists(place(out, "checkpoint.h5")) and changed(place(out, "checkpoint.h5"), begun))
         )
         time.sleep(rng.uniform(0, 0.6))
     # A second starter beside it: refused while the first lives, its heir once it is dead.
@@ -94,10 +96,10 @@ def kill_once(place, scene, out, rng, record):
     number = rng.choice(SIGNALS)
     hit = [pid for pid in chosen if process.poll() is None and kill(pid, getattr(signal, number))]
     try:
-        process.wait(60)
+        process.wait(300)
     except subprocess.TimeoutExpired:
         process.kill()
-        check(False, f"{out}: it did not end within 60 s of {number} to {victim}")
+        check(False, f"{out}: it did not end within 300 s of {number} to {victim}")
     # What lies there tells where the kill fell.
     writing = os.path.exists(temporary)
     newest, previous = os.path.exists(place(out, "checkpoint.h5")), os.path.exists(place(out, "checkpoint.prev.h5"))

@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 
-from faults import Place, check, finish, history, program, same_results, scene_text, wait_for
+from faults import Place, check, finish, history, program, same_results, scene_text, snapshots, wait_for
 
 
 def files(path):
@@ -34,7 +34,7 @@ def main():
         for ranks in (1, 2):
             out = f"taken{ranks}"
             process = place.start(long, out, ranks=ranks)
-            check(wait_for(lambda: os.path.exists(place(out, "history.csv"))), "the owner runs")
+            check(wait_for(lambda: os.path.exists(place(out, "history.csv")), process=process), "the owner runs")
             owner = json.load(open(place(out, "kuzure.lock")))
             for how in ((), ("--force",), ("--restart",)):
                 for others in (1, 2):
@@ -47,7 +47,7 @@ def main():
                     )
             check(not os.path.exists(place(out + ".old-1")), "nothing is moved aside under a living owner")
             os.kill(owner["pid"], signal.SIGHUP)
-            code = process.wait(60)
+            code = process.wait(300)
             check(
                 code == 5 and place.summary(out)["status"] == "stopped", f"the owner went on undisturbed and stops at SIGHUP: exit {code}"
             )
@@ -56,7 +56,7 @@ def main():
         # ---- a dead owner: killed, found at once; and one of another machine whose job was requeued as this one
         periodic = place.write("periodic.toml", scene_text(end=30.0, every=10.0, checkpoint=1e-6))
         process = place.start(periodic, "killed")
-        check(wait_for(lambda: os.path.exists(place("killed/checkpoint.prev.h5"))), "checkpoints are written")
+        check(wait_for(lambda: os.path.exists(place("killed/checkpoint.prev.h5")), process=process), "checkpoints are written")
         process.kill(), process.wait()
         check(os.path.exists(place("killed/kuzure.lock")), "a killed run leaves its lock")
         shutil.copytree(place("killed"), place("requeued"))
@@ -83,15 +83,20 @@ def main():
         check(files(place("home")) == before and not os.path.exists(place("home.old-1")), "the directory stays as it was")
 
         # ---- moved while it is written into, and another run in its old place
-        middle = place.write("middle.toml", scene_text(end=0.04, every=0.01))
-        place.run(middle, "middle")
-        process = place.start(middle, "moving")
-        check(wait_for(lambda: os.path.exists(place("moving/history.csv")) and len(history(place("moving"))) > 1), "it runs")
+        # One that ends by itself might have done so before it is moved: it goes on until it has written a snapshot there, and is stopped.
+        endless = place.write("endless.toml", scene_text(end=30.0, every=0.01))
+        process = place.start(endless, "moving", "--force-size")
+        runs = lambda: os.path.exists(place("moving/history.csv")) and len(history(place("moving"))) > 1
+        check(wait_for(runs, process=process), "it runs")
         os.rename(place("moving"), place("moved"))
-        still = process.poll() is None
+        there = len(snapshots(place("moved")))
         place.run(short, "moving")
-        process.wait(60)
-        check(still and process.returncode == 0, f"the moved run ends well: {process.returncode}")
+        check(wait_for(lambda: len(snapshots(place("moved"))) > there, process=process), "the moved run writes where its directory is")
+        process.send_signal(signal.SIGTERM)
+        check(process.wait(300) == 5, f"the moved run stops when it is asked to: {process.returncode}")
+        until = ["--set", f"time.end={(place.summary('moved')['steps'] + 40) * 1e-4}"]
+        place.run(endless, "moved", "--restart", *until)
+        place.run(endless, "middle", *until)
         same_results(place, "moved", "middle", "a run whose directory was moved")
         same_results(place, "moving", "calm", "a run in the place it had")
 
@@ -143,9 +148,9 @@ def main():
 
         for number in (signal.SIGUSR1, signal.SIGHUP, signal.SIGTERM):
             process = place.start(long, f"early{number}")
-            check(wait_for(lambda: catches(process.pid, number), every=0.001), "signals are listened to")
+            check(wait_for(lambda: catches(process.pid, number), every=0.001, process=process), "signals are listened to")
             process.send_signal(number)
-            code = process.wait(60)
+            code = process.wait(300)
             check(
                 code == 5 and os.path.exists(place(f"early{number}/checkpoint.h5")),
                 f"signal {number} during set-up: exit {code}, expected 5 and a checkpoint",

@@ -204,7 +204,7 @@ TEST_F(CheckpointTest, AFlippedBitIsRefusedOrHarmless)
         // In a child: a crash inside the library would be a finding, not the end of the test.
         const pid_t child = fork();
         if (child == 0) {
-            alarm(20);
+            alarm(300);
             Particles q;
             try {
                 const auto c = io::read_checkpoint(alone, copy, q);

@@ -5,6 +5,7 @@
 #include "io/owner.hpp"
 #include "io/result_directory.hpp"
 #include "io/rows.hpp"
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <fcntl.h>
@@ -178,11 +179,16 @@ TEST_F(OwnerTest, AJobThatWasRequeuedIsItsOwnSuccessor)
 TEST_F(OwnerTest, AnOwnerElsewhereIsKnownByItsHeartbeat)
 {
     forge([](auto& j) { j["boot"] = "another machine", j["host"] = "node7", j["job"] = "Slurm job 12\x1b[31m"; }, 30);
-    std::thread heart([this] {
-        std::this_thread::sleep_for(std::chrono::milliseconds(300));
-        beat(0);
+    // It beats until it was seen to: the first time may be before anybody looks.
+    std::atomic<bool> seen = false;
+    std::thread heart([&] {
+        while (!seen) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(300));
+            beat(0);
+        }
     });
     const auto said = refusal();
+    seen = true;
     heart.join();
     EXPECT_THAT(said, HasSubstr("node7"));
     EXPECT_THAT(said, HasSubstr("Slurm job 12?[31m")) << "and nothing of it commands the terminal";
