@@ -56,6 +56,24 @@ TEST(Predict, TwoRanksOfTwoNodesByHand)
     EXPECT_NEAR(s.imbalance, 0.1 * 2.5e-3, 1e-12);
 }
 
+TEST(Predict, AStepOfTwoPassesExchangesTwiceAndMakesListsOftener)
+{
+    const auto m = plain();
+    const RankLoad r{
+        .pairs = 1e6, .particles = 2e4, .rim = 2e4, .sent = 1000, .ghosts = 1000, .messages = 1, .far_messages = 1, .node_ghosts = 1000};
+    const std::vector<RankLoad> ranks{r, r};
+    Deployment at{.machine = m, .ranks = 2, .ranks_per_node = 1, .ghost_bytes = 100};
+    const auto one = predict_step(ranks, at);
+    at.scheme = scene::Scheme::Staggered;
+    const auto two = predict_step(ranks, at);
+    EXPECT_NEAR(two.halo - one.halo, 2 * 1e-6, 1e-12) << "a latency of the wire and one of handling more; the bytes are given";
+    EXPECT_DOUBLE_EQ(two.reduction, one.reduction);
+    EXPECT_NEAR(two.rebuild, one.rebuild * 17 / 3.16, 1e-12);
+    EXPECT_NEAR(two.pairs, 1.75 * one.pairs, 1e-12);
+    EXPECT_GT(two.particles, 2 * one.particles);
+    EXPECT_EQ(exchanges(scene::Scheme::Staggered), 2);
+}
+
 TEST(Predict, CutsAsOftenAsItPays)
 {
     const auto m = plain();

@@ -52,8 +52,10 @@ Exit scale(const Comm& comm, const Arguments& a)
         if (nodes > machine.node.count)
             throw BadInput(fmt::format("--ranks {}: {} has {} nodes, and {} ranks a node need {}. Remedy: fewer ranks, or --ranks-per-node",
                                        n, machine.name, machine.node.count, per_node, nodes));
-        cases.push_back(
-            count_case(s, filling, e, {machine, n, per_node, bytes, 0, e.mixed}, state.x, a.hilbert ? Method::Hilbert : Method::Metis));
+        cases.push_back(count_case(
+            s, filling, e,
+            {.machine = machine, .ranks = n, .ranks_per_node = per_node, .ghost_bytes = bytes, .mixed = e.mixed, .scheme = e.scheme},
+            state.x, a.hilbert ? Method::Hilbert : Method::Metis));
     }
     for (Case& c : cases) c.efficiency = cases.front().step.total() * cases.front().cores / (c.step.total() * c.cores);
     if (a.json) {
@@ -61,7 +63,8 @@ Exit scale(const Comm& comm, const Arguments& a)
         for (const Case& c : cases) all.push_back(to_json(c, bytes, a.per_rank));
         fmt::print("{}\n", all.dump(2));
     } else {
-        fmt::print("{}", to_text(cases, s, {machine, 1, 1, bytes, 0, e.mixed}, e.soil, a.from.empty() ? "at the start" : "from " + a.from));
+        fmt::print("{}", to_text(cases, s, {.machine = machine, .ghost_bytes = bytes, .mixed = e.mixed, .scheme = e.scheme}, e.soil,
+                                 a.from.empty() ? "at the start" : "from " + a.from));
     }
     return Exit::Ok;
 }

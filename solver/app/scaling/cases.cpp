@@ -71,6 +71,7 @@ Case count_case(const Scene& s, const scene::Filling& filling, const Estimate& e
     for (const auto& r : c.cut.rank)
         c.memory = std::max(c.memory, e.memory / double(e.soil) * double(r.work.particles) + (2 * at.ghost_bytes + 32) * double(r.ghosts));
     c.memory += bytes_per_process;
+    for (auto& r : c.cut.rank) r.messages *= exchanges(at.scheme); // told of a step
     return c;
 }
 

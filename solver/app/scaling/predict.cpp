@@ -19,11 +19,10 @@ io::MachineProfile machine_named(const std::string& name_or_path)
 namespace {
 
 // What the model assumes beside a machine's constants; each is explained in docs/performance.md.
-constexpr double rim_per_seen = 1.5;     // a cluster waits as a whole when one of its particles does
-constexpr double steps_per_rebuild = 17; // hirata_52: 579 rebuilds in 10,000 steps
-constexpr double rebuild_exchanges = 4;  // migration, boxes, counts, sorted positions of ghosts
-constexpr double sorted_bytes = 40;      // of a ghost's sorted position, id and soil, at a rebuild
-constexpr double box_bytes = 48;         // of a rank's box, which every rank gets
+constexpr double rim_per_seen = 1.5;    // a cluster waits as a whole when one of its particles does
+constexpr double rebuild_exchanges = 4; // migration, boxes, counts, sorted positions of ghosts
+constexpr double sorted_bytes = 40;     // of a ghost's sorted position, id and soil, at a rebuild
+constexpr double box_bytes = 48;        // of a rank's box, which every rank gets
 // Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
 constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
 constexpr double even_iterations = 55;  // numbers told to all peers, each with a sum over all ranks
@@ -33,17 +32,36 @@ constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which
 constexpr double state_bytes = 252;     // of a particle that migrates
 constexpr double scalar_ns_here = 59;   // particle_ns of the machine where even_seconds was measured
 
+/// What a scheme's step is made of: a machine's costs of pairs and particles are those of one pass (Bui's leap-frog) at the paper's step.
+/// hirata_52 on the machines of docs/performance.md: 579 rebuilds in 10,000 steps of 1e-4 s, 250 in 790 of the default; a
+/// rebuild costs a particle 15/59 x 17 of what a step of one pass does, and `move` a quarter.
+struct Scheme {
+    double passes;            // over the pairs, each with its own exchange of ghosts behind interior clusters
+    double pairs;             // cost of a step's pairs, in one pass
+    double particles;         // cost of a step's particles, in those of one pass with lists every 17th step
+    double steps_per_rebuild; // while the soil flows
+    double growth;            // of the imbalance a step: longer steps move soil further
+};
+constexpr Scheme one_pass{1, 1, 1, 17, 1};
+constexpr double lists_of_particle = 15.0 / 59;
+constexpr Scheme two_pass{2, 1.75, 1.25 * (1 - lists_of_particle) + lists_of_particle * 17 / 3.16, 3.16, 10000.0 / 790};
+
 /// Growth of max/mean - 1 a step while soil slides, for a mean rank's soil: smaller parts are crossed sooner. Fitted to
 /// `perf/scaling.py drift` on 4, 16, 32 and 64 ranks (docs/performance.md).
 double imbalance_growth(double particles) { return 6.1e-5 * std::pow(35152 / std::max(1.0, particles), 0.56); }
 
+const Scheme& scheme_of(scene::Scheme s) { return s == scene::Scheme::Staggered ? two_pass : one_pass; }
+
 } // namespace
+
+int exchanges(scene::Scheme scheme) { return int(scheme_of(scheme).passes); }
 
 StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
 {
     const auto& c = at.machine.cost;
     const double cores = double(at.machine.node.cores) / at.ranks_per_node;
-    const double pair = 1e-9 * c.pair_ns(at.mixed) / cores, particle = 1e-9 * c.particle_ns / cores;
+    const Scheme& scheme = scheme_of(at.scheme);
+    const double pair = 1e-9 * c.pair_ns(at.mixed) * scheme.pairs / cores, particle = 1e-9 * c.particle_ns * scheme.particles / cores;
     const double latency = c.latency * at.latency_times, bandwidth = c.bandwidth * at.bandwidth_times;
     const double memory = c.memory_bandwidth / at.ranks_per_node; // a rank's share
 
@@ -56,10 +74,11 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
         // Packed and unpacked once each: read and written.
         const double copies = 2 * (r.sent + r.ghosts) * at.ghost_bytes / memory;
         const double near = r.messages - r.far_messages;
-        const double wire = (r.far_messages > 0 ? latency : 0) + r.node_ghosts * at.ghost_bytes / bandwidth +
+        // A latency for each exchange; the bytes are those of all together.
+        const double wire = (r.far_messages > 0 ? scheme.passes * latency : 0) + r.node_ghosts * at.ghost_bytes / bandwidth +
                             (near > 0 ? 2 * std::max(0.0, r.sent) * at.ghost_bytes / memory : 0);
         // Half the latency of a message is the processor's own time, at both ends; within a node a fifth of it.
-        const double handling = latency * (r.far_messages + 0.2 * near);
+        const double handling = scheme.passes * latency * (r.far_messages + 0.2 * near);
         const double halo = copies + handling + std::max(0.0, wire - interior);
         s.network = std::max(s.network, wire);
         messages = std::max(messages, r.messages), ghosts = std::max(ghosts, r.ghosts), node_ghosts = std::max(node_ghosts, r.node_ghosts);
@@ -73,7 +92,7 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
     s.reduction = 2 * levels * latency;
     s.rebuild = (rebuild_exchanges * (2 * messages + 2 * levels) * latency + (node_ghosts * sorted_bytes) / bandwidth +
                  double(at.ranks_per_node) * at.ranks * box_bytes / bandwidth) /
-                steps_per_rebuild;
+                scheme.steps_per_rebuild;
     // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
     // sqrt(2 C/(d t)) steps, and cut and idle time together cost 2 C of them.
     // The pairs of each block are counted from the lists first: no more work than making the lists.
@@ -82,15 +101,15 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
     for (const RankLoad& r : ranks)
         far = std::max(far, r.far_messages + 0.2 * (r.messages - r.far_messages)), most_particles = std::max(most_particles, r.particles);
     const double collective = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
-    const double cut = at.blocks == 0
-                           ? 0
-                           : at.blocks / at.ranks * even_seconds * c.particle_ns / scalar_ns_here +
-                                 most_particles * particle * steps_per_rebuild + even_iterations * (far * latency + latency + collective) +
-                                 even_rounds * (3 * (messages * latency + collective) + 2 * collective) +
-                                 double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + collective +
-                                 even_moves * most_particles * state_bytes * at.ranks_per_node / bandwidth;
+    const double cut = at.blocks == 0 ? 0
+                                      : at.blocks / at.ranks * even_seconds * c.particle_ns / scalar_ns_here +
+                                            most_particles * particle * scheme.steps_per_rebuild +
+                                            even_iterations * (far * latency + latency + collective) +
+                                            even_rounds * (3 * (messages * latency + collective) + 2 * collective) +
+                                            double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + collective +
+                                            even_moves * most_particles * state_bytes * at.ranks_per_node / bandwidth;
     if (cut > 0) {
-        s.recut_steps = std::sqrt(2 * cut / (imbalance_growth(soil / double(ranks.size())) * s.total()));
+        s.recut_steps = std::sqrt(2 * cut / (scheme.growth * imbalance_growth(soil / double(ranks.size())) * s.total()));
         s.recut = 2 * cut / s.recut_steps;
     }
     return s;
@@ -135,7 +154,13 @@ double predict_seconds(const Estimate& e, const io::MachineProfile& m, int nodes
                .messages = std::min(26.0, ranks - 1)};
     r.far_messages = nodes > 1 ? r.messages : 0;
     r.node_ghosts = nodes > 1 ? shell(n * ranks_per_node) : 0;
-    const Deployment at{m, int(ranks), ranks_per_node, e.record, std::min(double(default_blocks_per_rank), n / 27) * ranks, e.mixed};
+    const Deployment at{.machine = m,
+                        .ranks = int(ranks),
+                        .ranks_per_node = ranks_per_node,
+                        .ghost_bytes = e.record,
+                        .blocks = std::min(double(default_blocks_per_rank), n / 27) * ranks,
+                        .mixed = e.mixed,
+                        .scheme = e.scheme};
     return double(e.steps) * predict_step(std::span(&r, 1), at).total();
 }
 

@@ -44,7 +44,10 @@ struct Deployment {
     double ghost_bytes = 128, blocks = 0;
     bool mixed = false;
     double latency_times = 1, bandwidth_times = 1; // for questions of sensitivity
+    scene::Scheme scheme = scene::Scheme::LeapFrog;
 };
+/// How often ghosts are exchanged in a step.
+int exchanges(scene::Scheme);
 StepSeconds predict_step(std::span<const RankLoad>, const Deployment&);
 /// The loads of a counted cut, its ranks on nodes in order.
 std::vector<RankLoad> loads(const CutShare&, int ranks_per_node);
