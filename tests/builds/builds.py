@@ -69,3 +69,11 @@ def same_bits(commands, scene, work, *sets):
             got["state_hash"] == expected["state_hash"] and got["steps"] == expected["steps"] > 0,
             f"{words}: state_hash {got['state_hash']}, {expected['state_hash']} by the program under test, {got['steps']} steps",
         )
+
+
+def reference_bits(kuzure):
+    """kuzure gives what tests/regression keeps: four scenes, their hashes and energies."""
+    script = os.path.join(root, "tests/regression/regression_test.py")
+    done = subprocess.run([sys.executable, script, kuzure], capture_output=True, text=True, timeout=7000)
+    lines = [line for line in done.stdout.splitlines() if "state_hash" in line or line.startswith("FAIL")]
+    check(done.returncode == 0, "tests/regression:\n  " + "\n  ".join(lines) + done.stderr[-500:])
