@@ -1,5 +1,6 @@
-# cmake --install: the program, its data, completions and manual page, and the solver library for other programs
-# (find_package(kuzure): kuzure::solver and kuzure::scene, without MPI and HDF5). jobs/package.sh makes a Debian package.
+# cmake --install: the program, its data, completions and manual page, and libraries for other programs: find_package(kuzure
+# COMPONENTS simulation) gives kuzure::kuzure, whole runs; without the component kuzure::solver and kuzure::scene alone, without MPI and
+# HDF5. jobs/package.sh makes a Debian package.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -68,22 +69,29 @@ kuzure: bogus-mail-host-in-debian-changelog *
   ]] COMPONENT data)
 endif()
 
-# ---- the solver library ------------------------------------------------------------------------------------------------
-foreach(name flags scene solver)
+# ---- the libraries --------------------------------------------------------------------------------------------------------
+# Headers of the layers name one another from the root of the sources, so that is a folder of includes as well: <kuzure/solver/...>.
+set(headers include/kuzure)
+set(config ${CMAKE_INSTALL_LIBDIR}/cmake/kuzure)
+foreach(name flags scene solver decomposition io perf run)
   set_target_properties(kuzure_${name} PROPERTIES EXPORT_NAME ${name})
   add_library(kuzure::${name} ALIAS kuzure_${name})
 endforeach()
-set(headers include/kuzure-${PROJECT_VERSION})
+set_target_properties(kuzure_api PROPERTIES EXPORT_NAME kuzure)
+add_library(kuzure::kuzure ALIAS kuzure_api)
 install(TARGETS kuzure_flags kuzure_scene kuzure_solver EXPORT kuzure COMPONENT development
-        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION ${headers})
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION include ${headers})
+install(TARGETS kuzure_api kuzure_run kuzure_io kuzure_decomposition kuzure_perf EXPORT kuzureSimulation COMPONENT development
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} INCLUDES DESTINATION include)
+install(FILES solver/api/simulation.hpp DESTINATION ${headers} COMPONENT development)
 install(DIRECTORY solver/core solver/scene solver/physics solver/neighbours solver/pairs solver/effects solver/walls solver/kernels
         DESTINATION ${headers}/solver COMPONENT development FILES_MATCHING PATTERN "*.hpp")
-set(config ${CMAKE_INSTALL_LIBDIR}/cmake/kuzure)
 install(EXPORT kuzure FILE kuzureTargets.cmake NAMESPACE kuzure:: DESTINATION ${config} COMPONENT development)
+install(EXPORT kuzureSimulation FILE kuzureSimulationTargets.cmake NAMESPACE kuzure:: DESTINATION ${config} COMPONENT development)
 configure_package_config_file(cmake/kuzureConfig.cmake.in kuzureConfig.cmake INSTALL_DESTINATION ${config})
 write_basic_package_version_file(kuzureConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/kuzureConfig.cmake ${PROJECT_BINARY_DIR}/kuzureConfigVersion.cmake DESTINATION ${config}
-        COMPONENT development)
+install(FILES ${PROJECT_BINARY_DIR}/kuzureConfig.cmake ${PROJECT_BINARY_DIR}/kuzureConfigVersion.cmake cmake/FindMETIS.cmake
+        DESTINATION ${config} COMPONENT development)
 
 # ---- the Debian package (jobs/package.sh says which builds go into it) -----------------------------------------------------
 set(CPACK_PACKAGE_NAME kuzure)

@@ -6,6 +6,8 @@
 #                            snap only
 #   jobs/install.sh paraview also ParaView and a display in memory, 1.1 GB, for the test of its macro
 #   jobs/install.sh cluster  also what the tests on virtual nodes need: ctest -L cluster
+#   jobs/install.sh builds   also other compilers, MPI libraries and architectures for tests/builds: clang, MPICH, a cross compiler and qemu
+#                            for 64-bit Arm, and its libraries, unpacked into build/arm64 (570 MB); doxygen
 # Does nothing, and needs no network, where everything is there.
 set -euo pipefail
 
@@ -20,6 +22,9 @@ tests=(black clang-format valgrind binutils dpkg-dev fakeroot python3-jsonschema
 extras=(ffmpeg fonts-ipafont-gothic)
 command -v chromium >/dev/null || extras+=(chromium)
 paraview=(paraview python3-paraview xvfb xauth libgl1-mesa-dri)
+builds=(clang libclang-rt-dev libomp-dev mpich libmpich-dev libhdf5-mpich-dev g++-aarch64-linux-gnu qemu-user mmdebstrap doxygen)
+arm64_libraries=libmpich-dev,libhdf5-mpich-dev,libmetis-dev,libfmt-dev,libtomlplusplus-dev,libcli11-dev,libpng-dev,nlohmann-json3-dev
+arm64_libraries+=,libgtest-dev,libgmock-dev,libc6-dev,libstdc++-12-dev,libgomp1
 cluster=(slurm-wlm munge iproute2 util-linux shellcheck)
 
 packages=("${build[@]}" "${libraries[@]}" "${scripts[@]}")
@@ -29,8 +34,9 @@ tests) packages+=("${tests[@]}") ;;
 extras) packages+=("${extras[@]}") ;;
 paraview) packages+=("${tests[@]}" "${paraview[@]}") ;;
 cluster) packages+=("${tests[@]}" "${cluster[@]}") ;;
+builds) packages+=("${tests[@]}" "${builds[@]}") ;;
 *)
-    echo "usage: jobs/install.sh [tests|extras|paraview|cluster]" >&2
+    echo "usage: jobs/install.sh [tests|extras|paraview|cluster|builds]" >&2
     exit 2
     ;;
 esac
@@ -66,7 +72,9 @@ missing=()
 for package in "${packages[@]}"; do
     [[ $installed == *" ii $package "* || $installed == *" hi $package "* ]] || missing+=("$package")
 done
-[ ${#missing[@]} = 0 ] && exit 0
+arm64=$(dirname "${BASH_SOURCE[0]}")/../build/arm64
+[ "${1-}" != builds ] || [ -e "$arm64/usr/lib/aarch64-linux-gnu/libmpich.so" ] || need_arm64=yes
+[ ${#missing[@]} != 0 ] || [ -n "${need_arm64-}" ] || exit 0
 
 as_root=()
 if [ "$(id -u)" != 0 ]; then
@@ -83,10 +91,10 @@ apt() { # an apt-get that waits for other installers, asks nothing, and keeps it
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive NEEDRESTART_MODE=a apt-get -q -y -o DPkg::Lock::Timeout=600 \
         -o Acquire::Retries=3 "$@" >>"$log" 2>&1 </dev/null
 }
-echo "installing ${#missing[@]} packages (a minute or more, as the network is; what happens: tail $log): ${missing[*]}"
+[ ${#missing[@]} = 0 ] || echo "installing ${#missing[@]} packages (a minute or more, as the network is; what happens: tail $log): ${missing[*]}"
 updated=yes
-apt update || updated=no
-if ! apt install --no-install-recommends "${missing[@]}"; then
+[ ${#missing[@]} = 0 ] || apt update || updated=no
+if [ ${#missing[@]} != 0 ] && ! apt install --no-install-recommends "${missing[@]}"; then
     tail -n 15 "$log" >&2
     if [ $updated = no ]; then
         fail "the package lists could not be fetched: is there a network, or a proxy to set in /etc/apt/apt.conf?" \
@@ -94,6 +102,13 @@ if ! apt install --no-install-recommends "${missing[@]}"; then
     fi
     fail "apt-get could not install: ${missing[*]}" "Debian before 12 and Ubuntu before 24.04 do not have them all." \
         "If a package was interrupted before, run: dpkg --configure -a. The whole log: $log"
+fi
+if [ -n "${need_arm64-}" ]; then
+    # Unpacked, not installed: no architecture is added to this system.
+    mkdir -p "$(dirname "$arm64")"
+    rm -rf "$arm64"
+    mmdebstrap --architectures=arm64 --variant=extract --include=$arm64_libraries bookworm "$arm64" http://deb.debian.org/debian >>"$log" 2>&1 ||
+        fail "the libraries for 64-bit Arm could not be fetched. The whole log: $log"
 fi
 rm -f "$log"
 echo "installed in $((SECONDS - started)) s"

@@ -21,6 +21,10 @@ using Clock = std::chrono::steady_clock;
 constexpr int register_bytes = 64, chains = 16; // of 32 registers
 #elif defined(__AVX__)
 constexpr int register_bytes = 32, chains = 12; // of 16 registers
+#elif defined(__ARM_FEATURE_SVE_BITS) && __ARM_FEATURE_SVE_BITS > 0
+constexpr int register_bytes = __ARM_FEATURE_SVE_BITS / 8, chains = 16; // of 32 registers
+#elif defined(__aarch64__)
+constexpr int register_bytes = 16, chains = 16;
 #else
 constexpr int register_bytes = 16, chains = 12;
 #endif

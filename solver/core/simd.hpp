@@ -5,6 +5,12 @@
 #include "solver/core/scalar.hpp"
 #if defined(__x86_64__)
 #include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#if defined(__ARM_FEATURE_SVE_BITS) && __ARM_FEATURE_SVE_BITS > 128
+#define KUZURE_SVE 1 // of a length that is fixed as this is compiled (-msve-vector-bits): its registers are vectors like any other
+#include <arm_sve.h>
+#endif
 #endif
 
 namespace kuzure {
@@ -31,6 +37,8 @@ template <class T, int W> struct Simd {
 inline constexpr int register_bytes = 64;
 #elif defined(__AVX2__)
 inline constexpr int register_bytes = 32;
+#elif defined(KUZURE_SVE)
+inline constexpr int register_bytes = __ARM_FEATURE_SVE_BITS / 8;
 #else
 inline constexpr int register_bytes = 16;
 #endif
@@ -46,8 +54,14 @@ inline const char* instruction_set()
     return "avx512";
 #elif defined(__AVX2__)
     return "avx2";
-#else
+#elif defined(__x86_64__)
     return "x86-64";
+#elif defined(KUZURE_SVE)
+    return register_bytes == 64 ? "sve-512" : register_bytes == 32 ? "sve-256" : "sve";
+#elif defined(__aarch64__)
+    return "neon";
+#else
+    return "unknown";
 #endif
 }
 
@@ -69,6 +83,12 @@ template <class T, int W> struct Lanes {
     KUZURE_INLINE T operator[](int k) const { return v[k]; }
 #endif
 };
+
+#if defined(KUZURE_SVE)
+typedef svfloat64_t Sve64 __attribute__((arm_sve_vector_bits(__ARM_FEATURE_SVE_BITS)));
+typedef svfloat32_t Sve32 __attribute__((arm_sve_vector_bits(__ARM_FEATURE_SVE_BITS)));
+template <class T, int W> inline constexpr bool is_sve = W * sizeof(T) == register_bytes;
+#endif
 } // namespace detail
 
 // ---- arithmetic --------------------------------------------------------------------------------------------------
@@ -99,6 +119,16 @@ KUZURE_T Simd<T, W> fma(Simd<T, W> a, Simd<T, W> b, Simd<T, W> c)
 #if defined(__FMA__)
     if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_fmadd_pd(a.v, b.v, c.v)};
     if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+#endif
+#if defined(KUZURE_SVE)
+    if constexpr (sizeof(T) == 8 && detail::is_sve<T, W>)
+        return {detail::Sve64(svmad_x(svptrue_b64(), detail::Sve64(a.v), detail::Sve64(b.v), detail::Sve64(c.v)))};
+    if constexpr (sizeof(T) == 4 && detail::is_sve<T, W>)
+        return {detail::Sve32(svmad_x(svptrue_b32(), detail::Sve32(a.v), detail::Sve32(b.v), detail::Sve32(c.v)))};
+#endif
+#if defined(__aarch64__)
+    if constexpr (sizeof(T) == 8 && W == 2) return {vfmaq_f64(c.v, a.v, b.v)};
+    if constexpr (sizeof(T) == 4 && W == 4) return {vfmaq_f32(c.v, a.v, b.v)};
 #endif
     Simd<T, W> r;
     for (int k = 0; k < W; ++k) r.v[k] = fma(T(a.v[k]), T(b.v[k]), T(c.v[k]));
@@ -139,6 +169,14 @@ KUZURE_T Simd<T, W> sqrt(Simd<T, W> a)
 #if defined(__AVX2__)
     if constexpr (sizeof(T) == 8 && W == 4) return {_mm256_sqrt_pd(a.v)};
     if constexpr (sizeof(T) == 4 && W == 8) return {_mm256_sqrt_ps(a.v)};
+#endif
+#if defined(KUZURE_SVE)
+    if constexpr (sizeof(T) == 8 && detail::is_sve<T, W>) return {detail::Sve64(svsqrt_x(svptrue_b64(), detail::Sve64(a.v)))};
+    if constexpr (sizeof(T) == 4 && detail::is_sve<T, W>) return {detail::Sve32(svsqrt_x(svptrue_b32(), detail::Sve32(a.v)))};
+#endif
+#if defined(__aarch64__)
+    if constexpr (sizeof(T) == 8 && W == 2) return {vsqrtq_f64(a.v)};
+    if constexpr (sizeof(T) == 4 && W == 4) return {vsqrtq_f32(a.v)};
 #endif
     Simd<T, W> r;
     for (int k = 0; k < W; ++k) r.v[k] = sqrt(T(a.v[k]));
@@ -240,6 +278,10 @@ inline void flush_denormals()
 {
 #if defined(__x86_64__)
     _mm_setcsr(_mm_getcsr() | 0x8040);
+#elif defined(__aarch64__)
+    std::uint64_t control;
+    asm volatile("mrs %0, fpcr" : "=r"(control));
+    asm volatile("msr fpcr, %0" : : "r"(control | std::uint64_t(1) << 24));
 #endif
 }
 inline void prefetch(const void* p) { __builtin_prefetch(p); }

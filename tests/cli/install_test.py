@@ -1,14 +1,16 @@
 #!/usr/bin/python3
-"""An installed kuzure works from its place, and find_package(kuzure) gives the solver library without MPI and HDF5.
+"""An installed kuzure works from its place; find_package(kuzure) gives the solver library without MPI and HDF5, and whole runs.
 Run as install_test.py PROGRAM; uses the libraries of PROGRAM's build directory and builds nothing there."""
+import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from harness import finish, need, program
+from harness import check, finish, need, program, root
 
 PROGRAM = Path(program)
 BUILD = PROGRAM.parent
@@ -22,15 +24,15 @@ add_executable(scene_only scene.cpp)
 target_link_libraries(scene_only PRIVATE kuzure::scene)
 """
 # A stress far outside the cone comes back onto it; a model of the pair pass is chosen and named.
-SOLVER = """#include <solver/kernels/pair_model.hpp>
-#include <solver/physics/drucker_prager.hpp>
-#include <solver/scene/scene.hpp>
+SOLVER = """#include <kuzure/solver/kernels/pair_model.hpp>
+#include <kuzure/solver/physics/drucker_prager.hpp>
+#include <kuzure/solver/scene/scene.hpp>
 #include <cstdio>
 int main()
 {
     kuzure::Scene s;
     s.space.spacing = 0.1;
-    s.soils.push_back({"sand", 1850, 1.8e6, 0.3, 0, 0.4363, 0, kuzure::scene::Cone::Compression, {}});
+    s.soils.push_back({.name = "sand", .density = 1850, .young = 1.8e6, .poisson = 0.3, .friction_angle = 0.4363});
     const auto law = kuzure::Elastoplastic<double>::from(kuzure::Material::from(s.soils[0]));
     const kuzure::Stress trial{-3e3, -1e3, -9e3, 2e3, 0, 5e2};
     const auto back = kuzure::return_to_cone(trial, law);
@@ -40,7 +42,7 @@ int main()
     return out > 100 && on < 1e-9 && on > -1e-9 && back.plastic_work > 0 && model->cluster_width() > 0 ? 0 : 1;
 }
 """
-SCENE = """#include <solver/scene/fill.hpp>
+SCENE = """#include <kuzure/solver/scene/fill.hpp>
 #include <cstdio>
 int main()
 {
@@ -56,6 +58,34 @@ def run(*command, cwd=None, expected=0, environment={}):
     done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=600, env=environment)
     need(done.returncode == expected, f"{' '.join(map(str, command))}: exit {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
     return done.stdout
+
+
+def of_page(language, words):
+    """The block of docs/cpp.md in this language that holds these words."""
+    text = (Path(root) / "docs/cpp.md").read_text()
+    return next(block for block in re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S) if words in block)
+
+
+def try_simulation(work, prefix, program, flags):
+    """The run in ten lines of docs/cpp.md, against an installed kuzure: the hash of the program, on one rank and on two."""
+    source = work / "simulation"
+    source.mkdir()
+    (source / "CMakeLists.txt").write_text(of_page("cmake", "COMPONENTS simulation"))
+    (source / "main.cpp").write_text(of_page("cpp", "kuzure/simulation.hpp"))
+    run("cmake", "-S", source, "-B", source / "build", f"-DCMAKE_PREFIX_PATH={prefix}", *flags)
+    run("cmake", "--build", source / "build")
+    scene = Path(root) / "tests/regression/dry_3d.toml"
+    run(program, "run", scene, "-o", source / "out", "--quiet", "--set", "soil.sand.friction_angle=30")
+    expected = json.loads((source / "out/summary.json").read_text())["state_hash"]
+    mpiexec = re.search(r"^MPIEXEC_EXECUTABLE:\w+=(.*)$", (BUILD / "CMakeCache.txt").read_text(), re.M)[1]
+    for launcher in ([], [mpiexec, "-n", "2"]):
+        said = run(*launcher, source / "build/mine", scene)
+        check(f"state_hash {expected}" in said, f"{' '.join(launcher) or 'alone'}: {said.strip()}, the program's {expected}")
+    # A wrong scene is an exception with the program's words.
+    wrong = work / "wrong.toml"
+    wrong.write_text(scene.read_text().replace("poisson", "poison"))
+    done = subprocess.run([str(source / "build/mine"), str(wrong)], capture_output=True, text=True, timeout=100)
+    check(done.returncode != 0 and "poison" in done.stderr, f"a misspelt key: {done.stderr.strip()[-200:]}")
 
 
 def main():
@@ -132,6 +162,8 @@ def main():
             print(run(work / "build" / name), end="")
             linked = run("ldd", work / "build" / name)
             need("libmpi" not in linked and "hdf5" not in linked, f"{name} is linked with MPI or HDF5:\n{linked}")
+
+        try_simulation(work, prefix, PROGRAM, flags)
 
         # The control: another version is refused.
         (source / "CMakeLists.txt").write_text(CMAKE.replace("kuzure 0.1", "kuzure 7.0"))

@@ -42,6 +42,7 @@ LAYERS = {
     "io": ["solver/core", "solver/scene"],
     "perf/bench": ["solver", "decomposition", "io", "perf"],
     "perf": ["solver/core/team.hpp"],
+    "solver/api": ["solver/core", "solver/scene", "solver/run", "decomposition", "io"],
     "solver/app": ["solver", "decomposition", "io", "perf"],
     "tests": ["solver", "decomposition", "io", "perf"],
 }

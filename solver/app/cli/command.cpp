@@ -48,7 +48,14 @@ std::string packages_text() { return fmt::format("{}, {}, {}", Comm::library(), 
 
 std::string version_text()
 {
-    return fmt::format("kuzure {} ({}), GCC {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, __VERSION__, instruction_set(), _OPENMP);
+#if defined(__clang__)
+    const char* const compiler = __clang_version__;
+    const char* const name = "Clang";
+#else
+    const char* const compiler = __VERSION__;
+    const char* const name = "GCC";
+#endif
+    return fmt::format("kuzure {} ({}), {} {}, {}, OpenMP {}", KUZURE_VERSION, KUZURE_GIT, name, compiler, instruction_set(), _OPENMP);
 }
 
 io::Path own_path()
