@@ -10,6 +10,9 @@ from harness import check, finish, program, root, scratch
 ARM64 = os.path.join(root, "build/arm64")
 # With every other length of its registers the program for 512 bits must not be started: the launcher knows.
 QEMU = ["qemu-aarch64", "-cpu", "max,sve512=on,sve-default-vector-length=64", "-L", ARM64]
+# What these want is not there: Cairo and GDAL's kin (built without), the start time of processes, which qemu makes up, and a clock whose
+# seconds are not those of an emulator.
+WITHOUT = {"picture_test", "raster_test", "owner_test", "phases_test"}
 
 
 def launcher_of(work):
@@ -33,7 +36,7 @@ def main():
     work = scratch("aarch64")
     launcher_of(work)
     here = {s: state([program], os.path.join(root, f"tests/regression/{s}.toml"), os.path.join(work, s)) for s in ("cohesive_2d", "dry_3d")}
-    for preset, tests in (("aarch64", names("unit", "mpi")), ("aarch64-sve512", ["pass_test"])):
+    for preset, tests in (("aarch64", [n for n in names("unit", "mpi") if n not in WITHOUT]), ("aarch64-sve512", ["pass_test"])):
         directory = build(preset, "kuzure", *tests)
         command = [*QEMU, os.path.join(directory, "kuzure")]
         print(version(command))
