@@ -97,12 +97,13 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
 void Layout::renew_walls(const Particles& p, PairModel& model)
 {
     if (scene_.walls.empty() || p.size() == 0) return;
-    const Cover needed(p, 2 * list_reach(scene_), reach_);
+    const double side = 2 * list_reach(scene_); // always the same, whatever the reach of these lists is
+    const Cover needed(p, side, reach_);
     std::vector<scene::Pose> poses;
     for (const int w : moving_) poses.push_back(scene_.walls[std::size_t(w)].pose);
     if (near_soil_ && near_soil_->holds(needed) && poses == moved_poses_) return;
     moved_poses_ = std::move(poses);
-    near_soil_.emplace(p, 2 * list_reach(scene_), 4 * reach_);
+    near_soil_.emplace(p, side, 4 * reach_);
     walls_.assign(scene_.walls.size(), {});
     for (std::size_t w = 0; w < walls_.size(); ++w) walls_[w].wall = int(w);
     // Walls repeat with the period as the soil does.

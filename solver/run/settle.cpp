@@ -3,6 +3,7 @@
 #include "solver/run/start.hpp"
 #include "solver/scene/at_rest.hpp"
 #include "solver/scene/events.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/loads.hpp"
 #include "solver/walls/friction.hpp"
 #include <fmt/format.h>
@@ -103,23 +104,20 @@ bool come_to_rest(Simulation& sim, const RunOptions& options, double most, doubl
 /// puts on the ground, slip = h/(2 G) (sigma n - (n.sigma n) n). Without it a mass goes a few milliseconds as on ice.
 void hand_over_to_friction(const Scene& scene, Particles& p)
 {
-    std::vector<const scene::HeightField*> grounds;
-    for (const auto& w : scene.walls)
-        if (const auto* g = std::get_if<scene::Ground>(&w.shape); g && w.present && w.surface == scene::Surface::Coulomb)
-            grounds.push_back(g->field.get());
-    if (grounds.empty() || scene.accuracy.scheme == scene::Scheme::LeapFrog) return;
+    const scene::Wall* ground = scene::ground_wall(scene);
+    if (!ground || ground->surface != scene::Surface::Coulomb || scene.accuracy.scheme == scene::Scheme::LeapFrog) return;
+    const auto& heights = *std::get<scene::Ground>(ground->shape).field;
     p.require(field::wall_slip);
     const auto soils = materials_of(scene);
     const Index count = p.size();
 #pragma omp parallel for schedule(static)
-    for (Index i = 0; i < count; ++i)
-        for (const auto* ground : grounds) {
-            const auto near = ground->nearest(p[field::position][i]);
-            if (!(near.distance < scene.support())) continue;
-            const Vector t = p[field::stress][i] * near.normal;
-            p[field::wall_slip].set(
-                i, slip_under(t - dot(t, near.normal) * near.normal, soils[p[field::soil][i]].shear, scene.smoothing_length()));
-        }
+    for (Index i = 0; i < count; ++i) {
+        const auto near = heights.nearest(p[field::position][i]);
+        if (!(near.distance < scene.support())) continue;
+        const Vector t = p[field::stress][i] * near.normal;
+        p[field::wall_slip].set(
+            i, slip_under(t - dot(t, near.normal) * near.normal, soils[p[field::soil][i]].shear, scene.smoothing_length()));
+    }
 }
 
 } // namespace

@@ -1,4 +1,5 @@
 #include "solver/scene/at_rest.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/loads.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/step_limits.hpp"
@@ -187,8 +188,7 @@ std::string no_closed_form(const Scene& scene, const Filling& filling)
         for (const auto& corner : effects.pore_pressure->table)
             if (corner[1] != effects.pore_pressure->table.front()[1]) return "the water table is not level";
 
-    if (std::ranges::any_of(scene.walls, [](const Wall& w) { return std::holds_alternative<Ground>(w.shape); }))
-        return "the soil lies on real ground, which is not level";
+    if (ground_wall(scene)) return "the soil lies on real ground, which is not level";
 
     const Columns columns(scene, filling);
     const double far = std::numeric_limits<double>::infinity();

@@ -59,7 +59,10 @@ Draped::Draped(const Ground& ground, double spacing)
     : field_(ground.field), spacing_(spacing), below_(true), plain_(ground.lattice == GroundLattice::Plain)
 {
     const auto layers = std::int64_t(std::ceil(ground.depth / spacing - 1e-9));
-    fill(scene::bounds(ground), [&](auto, auto, double, double) { return layers; });
+    fill(scene::bounds(ground), [&](auto, auto, double x, double y) {
+        shown_ += std::min(layers, shown_deep(x, y));
+        return layers;
+    });
 }
 
 Draped::Draped(const Release& release, double spacing) : field_(release.bed), spacing_(spacing), below_(false), plain_(false)

@@ -57,13 +57,17 @@ public:
             if (in > 0) visit(Stack{x, y, foot, top});
         });
     }
-    /// Calls visit(local id, position) for the points that show: those of a release, of the ground its surface, 2.5 spacings deep along
-    /// its normal so that slopes have no holes. By rising id.
-    template <class Visit> void for_each_shown(Visit visit) const
+    /// Of the ground, how many points show: its surface, 2.5 spacings deep along its normal so that slopes have no holes.
+    std::int64_t shown() const { return shown_; }
+    /// Calls visit(local id, position) for the begin-th to the last before the end-th of them, by rising id.
+    template <class Visit> void for_each_shown(std::int64_t begin, std::int64_t end, Visit visit) const
     {
+        std::int64_t before = 0;
         for_each_column_in(bounds_, [&](std::int64_t first, double x, double y, double surface, std::int64_t n) {
-            for (std::int64_t k = below_ ? std::max<std::int64_t>(0, n - shown_deep(x, y)) : 0; k < n; ++k)
-                visit(first + k, Vector{x, y, height(surface, k, n)});
+            const std::int64_t here = std::min(n, shown_deep(x, y)), hidden = n - here;
+            for (std::int64_t k = std::max<std::int64_t>(0, begin - before); k < std::min(end - before, here); ++k)
+                visit(first + hidden + k, Vector{x, y, height(surface, hidden + k, n)});
+            before += here;
         });
     }
     bool has_column(std::int64_t i, std::int64_t j) const
@@ -86,8 +90,7 @@ private:
     /// How many points of a column of the ground lie within 2.5 spacings of its surface.
     std::int64_t shown_deep(double x, double y) const
     {
-        const auto p = field_->at(x, y);
-        return std::int64_t(std::ceil(2.5 * std::sqrt(1 + p.dz_dx * p.dz_dx + p.dz_dy * p.dz_dy) - 0.5 - 1e-9)) + (plain_ ? 1 : 0);
+        return std::int64_t(std::ceil(2.5 * field_->at(x, y).steepness() - 0.5 - 1e-9)) + (plain_ ? 1 : 0);
     }
     double at(std::int64_t i) const { return (double(i) + 0.5) * spacing_; }
     /// Calls visit(first id, x, y, height of the surface, points) for the columns over a region in plan.
@@ -119,6 +122,7 @@ private:
     std::int64_t i0_ = 0, j0_ = 0, columns_ = 0, rows_ = 0;
     std::vector<std::int64_t> first_{0}; // id of each column's lowest point, and the end
     std::int64_t most_ = 0;              // points of a column
+    std::int64_t shown_ = 0;             // of the ground
     Box bounds_{};
 };
 

@@ -41,11 +41,6 @@ public:
     {
         std::visit([&](const auto& p) { p.for_each_in(region, visit); }, of_);
     }
-    template <class Visit> void for_each_shown(Visit visit) const
-    {
-        if (const auto* d = draped()) return d->for_each_shown(visit);
-        for (std::int64_t k = 0; k < size(); ++k) visit(k, position(k));
-    }
     template <class Visit> void for_each_stack_in(const Box& region, Visit visit) const
     {
         std::visit([&](const auto& p) { p.for_each_stack_in(region, visit); }, of_);
@@ -104,20 +99,24 @@ public:
         const Points& points = points_[n_bodies_ + std::size_t(wall)];
         for (std::int64_t k = 0; k < points.size(); ++k) visit(first_id_[n_bodies_ + std::size_t(wall)] + k, points.position(k));
     }
-    /// Calls visit(std::int64_t id, Vector x) for the wall particles that pictures and snapshots show, as drawn, by rising id: all but
-    /// those deep in real ground.
-    template <class Visit> void for_each_shown_wall(Visit visit) const
-    {
-        for (std::size_t w = n_bodies_; w < points_.size(); ++w)
-            points_[w].for_each_shown([&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x); });
-    }
+    /// How many wall particles pictures and snapshots show: all but those deep in real ground.
     std::int64_t shown_wall_count() const
     {
         std::int64_t n = 0;
-        for (std::size_t w = n_bodies_; w < points_.size(); ++w)
-            if (points_[w].draped()) points_[w].for_each_shown([&](std::int64_t, Vector) { ++n; });
-            else n += points_[w].size();
+        for (std::size_t w = n_bodies_; w < points_.size(); ++w) n += shown(points_[w]);
         return n;
+    }
+    /// Calls visit(std::int64_t id, Vector x) for the begin-th to the last before the end-th of them, as drawn, by rising id.
+    template <class Visit> void for_each_shown_wall(std::int64_t begin, std::int64_t end, Visit visit) const
+    {
+        for (std::size_t w = n_bodies_; w < points_.size(); ++w) {
+            const std::int64_t n = shown(points_[w]), from = std::max<std::int64_t>(0, begin), to = std::min(end, n);
+            if (const Draped* ground = points_[w].draped(); ground && from < to)
+                ground->for_each_shown(from, to, [&](std::int64_t k, Vector x) { visit(first_id_[w] + k, x); });
+            else
+                for (std::int64_t k = from; k < to; ++k) visit(first_id_[w] + k, wall_position(first_id_[w] + k));
+            begin -= n, end -= n;
+        }
     }
     /// Soil or wall particles in a closed region, counted without visiting them.
     std::int64_t soil_count_in(const Box& region) const;
@@ -134,6 +133,7 @@ public:
     int wall_of(std::int64_t wall_id) const;
 
 private:
+    static std::int64_t shown(const Points& p) { return p.draped() ? p.draped()->shown() : p.size(); }
     struct Survey {
         Issues issues;
         std::vector<std::optional<Points>> points; // bodies, then walls; nothing where a shape cannot be filled

@@ -3,12 +3,17 @@
 
 namespace kuzure::scene {
 
-/// The heights of real ground; nothing where a scene has none.
-inline const HeightField* ground_of(const Scene& s)
+/// The wall that is real ground, and its heights; nothing where a scene has none.
+inline const Wall* ground_wall(const Scene& s)
 {
     for (const auto& wall : s.walls)
-        if (const auto* g = std::get_if<Ground>(&wall.shape)) return g->field.get();
+        if (std::holds_alternative<Ground>(wall.shape)) return &wall;
     return nullptr;
+}
+inline const HeightField* ground_of(const Scene& s)
+{
+    const Wall* wall = ground_wall(s);
+    return wall ? std::get<Ground>(wall->shape).field.get() : nullptr;
 }
 
 /// Coulomb's friction of a wall at the point x (m) of its face, rad.

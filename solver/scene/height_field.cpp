@@ -94,8 +94,7 @@ HeightField::Nearest HeightField::nearest(Vector x) const
     double u = x.x, v = x.y;
     for (int k = 0; k < 24; ++k) {
         if (!std::isfinite(p.z)) break;
-        const double l = std::sqrt(1 + p.dz_dx * p.dz_dx + p.dz_dy * p.dz_dy);
-        normal = {-p.dz_dx / l, -p.dz_dy / l, 1 / l};
+        normal = p.normal();
         at_surface = {u, v, p.z};
         const Vector way = x - at_surface;
         const double away = length(way);

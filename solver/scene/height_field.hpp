@@ -1,6 +1,7 @@
 #pragma once
 // Ground as heights over a plan: a grid of numbers, and the smooth surface through it.
 #include "solver/core/tensor.hpp"
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -42,6 +43,14 @@ public:
     /// Height (m) and slopes (1) above a point in plan; NaN where heights are missing around it or beyond the grid.
     struct Point {
         double z, dz_dx, dz_dy;
+        /// Area of the surface over its area in plan.
+        double steepness() const { return std::sqrt(1 + dz_dx * dz_dx + dz_dy * dz_dy); }
+        /// Unit vector, upwards.
+        Vector normal() const
+        {
+            const double l = steepness();
+            return {-dz_dx / l, -dz_dy / l, 1 / l};
+        }
     };
     Point at(double x, double y) const;
     /// The area (m) on which there is a surface: to the edges of the outermost cells but one.

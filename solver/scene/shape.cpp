@@ -148,7 +148,7 @@ Contact contact(const Release& r, Vector x, int)
     const double h = thickness(r, x.x, x.y);
     if (!(h > 0)) return {distance_to_rings(r, x), {0, 0, 1}};
     const auto bed = r.bed->at(x.x, x.y);
-    const double slope = 1 / std::sqrt(1 + bed.dz_dx * bed.dz_dx + bed.dz_dy * bed.dz_dy), up = x.z - bed.z;
+    const double slope = 1 / bed.steepness(), up = x.z - bed.z;
     const Vector normal{-slope * bed.dz_dx, -slope * bed.dz_dy, slope};
     return up - h >= -up ? Contact{slope * (up - h), normal} : Contact{-slope * up, -1.0 * normal};
 }

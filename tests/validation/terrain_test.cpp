@@ -168,7 +168,7 @@ TEST(Terrain, WhatShowsOfTheGroundIsItsSurfaceWithoutHoles)
     const scene::Draped points(scene::Ground{std::make_shared<scene::HeightField>(field), depth}, dx);
     std::map<std::pair<double, double>, std::pair<double, double>> columns; // lowest and highest of each
     std::int64_t last = -1, n = 0;
-    points.for_each_shown([&](std::int64_t id, Vector x) {
+    points.for_each_shown(0, points.shown(), [&](std::int64_t id, Vector x) {
         ASSERT_GT(id, last) << "by rising id";
         const Vector same = points.position(id);
         ASSERT_TRUE(same.x == x.x && same.y == x.y && same.z == x.z);

@@ -320,7 +320,11 @@ void draw_maps(const Base& base, const Layers& from, const scene::MapGrid& grid,
     const scene::HeightField* ground = scene::ground_of(base.scene);
     for (const auto which : {from.reach, from.arrival + 1, from.thickness + 2}) {
         const auto& l = from.all[which];
-        io::MapPicture picture{l.kind, base.scene.title, cropped(raster_of(grid, crs, l.values).grid), {}, outlines, false, points};
+        io::MapPicture picture{.kind = l.kind,
+                               .title = base.scene.title,
+                               .values = cropped(raster_of(grid, crs, l.values).grid),
+                               .outlines = outlines,
+                               .points = points};
         if (ground)
             picture.ground = [&, ground](double x, double y) {
                 return ground->at(x - base.scene.map_frame.x, y - base.scene.map_frame.y).z;

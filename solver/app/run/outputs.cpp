@@ -17,10 +17,8 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const Mater
     io::WallPoints w;
     const std::int64_t n = f.shown_wall_count();
     const std::int64_t begin = n * comm.rank() / comm.size(), end = n * (comm.rank() + 1) / comm.size();
-    std::int64_t k = 0;
-    f.for_each_shown_wall([&](std::int64_t id, Vector x) {
-        if (k >= begin && k < end) w.position.push_back(x), w.id.push_back(id), w.density.push_back(first_soil.density);
-        ++k;
+    f.for_each_shown_wall(begin, end, [&](std::int64_t id, Vector x) {
+        w.position.push_back(x), w.id.push_back(id), w.density.push_back(first_soil.density);
     });
     return w;
 }

@@ -89,7 +89,7 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     e.checkpoint = double(io::checkpoint_bytes(e.soil, std::size_t(columns / std::max<double>(1, double(e.soil)))));
     e.history_rows = s.output.history ? times(*s.output.history) + 1 : 1;
     e.history = e.history_rows * 320;
-    e.scheme = s.accuracy.scheme, e.step_price = step_price(s.accuracy.scheme);
+    e.scheme = s.accuracy.scheme;
     // A collapse presses the soil together and spreads it: over the runs of docs/performance.md the one outweighs the other.
     e.pairs = double(e.steps) * double(e.soil) * neighbours_at_start(s, f) * 1.03;
     return e;
@@ -105,7 +105,7 @@ double step_price(scene::Scheme scheme)
 double work(const Estimate& e)
 {
     const double mixed = 0.76; // time of a pair in mixed precision over that in double (docs/performance.md)
-    return e.step_price * ((e.mixed ? mixed : 1) * e.pairs + StepWork::particle * double(e.soil) * double(e.steps));
+    return step_price(e.scheme) * ((e.mixed ? mixed : 1) * e.pairs + StepWork::particle * double(e.soil) * double(e.steps));
 }
 
 double machine_memory()

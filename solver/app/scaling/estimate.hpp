@@ -22,7 +22,6 @@ struct Estimate {
     double history_rows;
     double pairs; // directed pairs of all steps, each once a step
     scene::Scheme scheme;
-    double step_price; // of a step, in those of the one-pass scheme over the same soil
     double record;     // bytes of a ghost particle, sent every step
     double support;    // radius in which particles see each other, spacings
     bool mixed;        // precision of the pair sums

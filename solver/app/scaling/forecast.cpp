@@ -47,14 +47,16 @@ struct Measured {
 
 /// A few steps of a block of the scene's own soil and kernel, its lattice shaken as soil in motion is; on real ground, of the mass as it
 /// lies there, if that is no more.
-Measured measure(const Comm& comm, Scene s, std::int64_t soil)
+Measured measure(const Comm& comm, Scene s, const scene::Filling& filling, std::int64_t soil)
 {
     // So many particles that every rank has what a small run has, and no more than the scene itself.
     const double wanted = double(std::clamp<std::int64_t>(soil, 216, 8000 * std::int64_t(comm.size())));
     const double points = std::round(s.dimensions == 3 ? std::cbrt(wanted) : std::sqrt(wanted)), edge = points * s.space.spacing;
     const double shake = 0.2 * s.space.spacing;
+    RunOptions options;
     s.loads.clear(), s.events.clear(), s.probes.clear();
-    if (!scene::ground_of(s) || double(soil) > wanted) {
+    if (scene::ground_of(s) && double(soil) <= wanted) options.filling = filling;
+    else {
         s.space.low.reset(), s.space.high.reset(), s.space.periodic = {};
         s.walls.clear();
         s.bodies.resize(1);
@@ -63,7 +65,6 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
     for (auto& b : s.bodies) b.stress = scene::InitialStress::None;
     const double step = 1e-3 * scene::crossing_time(s);
     s.time = {.end = 1e3 * step, .step = step}; // more steps than are taken below, however soft the soil
-    RunOptions options;
     options.initial = [&](Particles& p) {
         for (Index i = 0; i < p.size(); ++i) {
             // three numbers in -1 .. 1 from the id, the same for any ranks
@@ -111,8 +112,8 @@ Measured measure(const Comm& comm, Scene s, std::int64_t soil)
 /// Way (m) of a point that slides down real ground against its friction from the middle of the soil, until the scene's end.
 double way_down(const Scene& s, const scene::Filling& f)
 {
-    const auto ground = std::ranges::find_if(s.walls, [](const scene::Wall& w) { return std::holds_alternative<scene::Ground>(w.shape); });
-    if (ground == s.walls.end() || !s.effects.gravity) return 0;
+    const scene::Wall* ground = scene::ground_wall(s);
+    if (!ground || !s.effects.gravity) return 0;
     const auto& field = *std::get<scene::Ground>(ground->shape).field;
     const Vector g = *s.effects.gravity;
     const auto& box = f.soil_bounds();
@@ -124,8 +125,7 @@ double way_down(const Scene& s, const scene::Filling& f)
         const auto p = field.at(x.x, x.y);
         if (!std::isfinite(p.z)) break;
         x.z = p.z;
-        const double l = std::sqrt(1 + p.dz_dx * p.dz_dx + p.dz_dy * p.dz_dy);
-        const Vector n{-p.dz_dx / l, -p.dz_dy / l, 1 / l};
+        const Vector n = p.normal();
         const double press = std::max(0.0, -dot(g, n)), speed = length(v);
         // The ground turns it without slowing it; then gravity along the ground, and friction.
         Vector along = v - dot(v, n) * n;
@@ -169,7 +169,7 @@ double rebuilds(const Scene& s, double way, double steps)
 Forecast forecast(const Comm& comm, const Scene& s, const scene::Filling& f, const Estimate& e, double done)
 {
     const double begin = omp_get_wtime();
-    const Measured m = measure(comm, s, e.soil);
+    const Measured m = measure(comm, s, f, e.soil);
     const bool ground = scene::ground_of(s) != nullptr;
     const double pair = (ground ? ragged : 1) * m.pair[m.pair.size() / 2], slower = chain_seconds() / reference_chain;
     const double soil = double(e.soil), in_steps = e.pairs * (1 - done) * pair;
