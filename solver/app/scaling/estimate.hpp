@@ -22,11 +22,11 @@ struct Estimate {
     double history_rows;
     double pairs; // directed pairs of all steps, each once a step
     scene::Scheme scheme;
-    double record;     // bytes of a ghost particle, sent every step
-    double support;    // radius in which particles see each other, spacings
-    bool mixed;        // precision of the pair sums
-    double columns;    // of the box around all soil, two spacings wide: one rank may hold them all
-    double longest;    // side of that box, spacings
+    double record;  // bytes of a ghost particle, sent every step
+    double support; // radius in which particles see each other, spacings
+    bool mixed;     // precision of the pair sums
+    double columns; // of the box around all soil, two spacings wide: one rank may hold them all
+    double longest; // side of that box, spacings
 
     /// Bytes on the disk in the end and at the worst moment before: two checkpoints and the one being written.
     double disk() const { return snapshots * snapshot + wall_files + 3 * checkpoint + history; }
