@@ -117,6 +117,9 @@ double way_down(const Scene& s, const scene::Filling& f)
     const auto& field = *std::get<scene::Ground>(ground->shape).field;
     const Vector g = *s.effects.gravity;
     const auto& box = f.soil_bounds();
+    // Soil on rough ground shears in itself.
+    const bool rough = ground->surface == scene::Surface::Rough;
+    const double own = s.soils[std::size_t(s.bodies.front().soil)].friction_angle;
     Vector x = 0.5 * (box.low + box.high), v{};
     double way = 0;
     constexpr int steps = 4000;
@@ -131,7 +134,7 @@ double way_down(const Scene& s, const scene::Filling& f)
         Vector along = v - dot(v, n) * n;
         if (const double kept = length(along); kept > 0) along = (speed / kept) * along;
         v = along + dt * (g - dot(g, n) * n);
-        const double now = length(v), lost = dt * press * std::tan(scene::friction_angle_at(*ground, x));
+        const double now = length(v), lost = dt * press * std::tan(rough ? own : scene::friction_angle_at(*ground, x));
         v = now > lost ? (1 - lost / now) * v : Vector{};
         x = x + dt * v, way += dt * length(v);
     }
