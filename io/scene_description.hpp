@@ -315,6 +315,12 @@ template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
              {.example = "\"double\"", .doc = "\"mixed\": pair sums in single, state in double precision"});
     a.choice("accuracy.correction", accuracy.correction, {{"none", scene::Correction::None}, {"gradient", scene::Correction::Gradient}},
              {.example = "\"none\"", .doc = "\"gradient\": velocity gradients exact for linear fields, also at surfaces"});
+    a.number("accuracy.shifting", accuracy.shifting,
+             {.unit = "1",
+              .range = between(0, 5),
+              .fallback = "0.0",
+              .example = "1.0",
+              .doc = "particles that shear plastically are shifted towards even spacing, by this constant (docs/theory.md); 0: not"});
     a.number("accuracy.skin", accuracy.skin,
              {.unit = "supports",
               .range = between(0.01, 0.5),

@@ -37,11 +37,16 @@ inline constexpr struct PlasticStrain : Field<"plastic_strain", "1", Shape::Scal
 // Only where a soil remembers: volume strain that tension at the apex has opened.
 inline constexpr struct OpenedVolume : Field<"opened_volume", "1", Shape::Scalar> {
 } opened_volume;
-// Of the staggered scheme, at t: what the next half kick needs; the stress rate of diffusion, for the next strain.
+// Of the staggered scheme, at t: what the next half kick needs; the stress rate of diffusion and shifting, for the next strain.
 inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vector> {
 } acceleration;
 inline constexpr struct StressRate : Field<"stress_rate", "Pa/s", Shape::Symmetric> {
 } stress_rate;
+// Only where particles are shifted: the velocity at which they are beside their own, and what that changes of their own.
+inline constexpr struct Shift : Field<"shift", "m/s", Shape::Vector> {
+} shift;
+inline constexpr struct ShiftAcceleration : Field<"shift_acceleration", "m/s^2", Shape::Vector> {
+} shift_acceleration;
 // Only where there are Coulomb walls: elastic slip, the acceleration by which a wall holds the particle (0: no contact), and the most
 // that friction carries.
 inline constexpr struct WallSlip : Field<"wall_slip", "m", Shape::Vector> {
@@ -85,9 +90,10 @@ inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::in
 /// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
 enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
-using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
-                             field::Acceleration, field::StressRate, field::WallSlip, field::WallPressure, field::WallFriction,
-                             field::WallForce, field::Load, field::LoadPush, field::Unstored, field::HalfVelocity, field::HalfDensity,
-                             field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+using AllFields =
+    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
+               field::Acceleration, field::StressRate, field::Shift, field::ShiftAcceleration, field::WallSlip, field::WallPressure,
+               field::WallFriction, field::WallForce, field::Load, field::LoadPush, field::Unstored, field::HalfVelocity,
+               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -1,12 +1,14 @@
 #pragma once
 // The force stage of the staggered scheme: forces of stresses, artificial stress and walls, with the viscous force of the strain stage
 // the acceleration of t^(n+1), and with it the velocity.
+#include "solver/kernels/loads_on_faces.hpp"
 #include "solver/kernels/staggered_records.hpp"
 #include "solver/walls/friction.hpp"
 
 namespace kuzure {
 
-template <class Below> class ForceStage : public Below {
+template <class Records> class ForceStage : public LoadsOnFaces<Records> {
+    using Below = LoadsOnFaces<Records>;
     using M = typename Below::Model;
     using V = typename Below::LaneType;
 
@@ -37,7 +39,8 @@ protected:
         U now, next;
     };
     template <class S>
-    using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm>;
+    using ForceSums =
+        typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm, typename M::CarriedTerm>;
     using Wide = WideLanes<W>;
 
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
@@ -46,8 +49,8 @@ protected:
     static Stage force_stage()
     {
         return {"force", sizeof(Stresses<T>) + (M::tensile ? sizeof(Tension<T>) : 0),
-                23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops + M::more_flops, 60,
-                25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
+                23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops + M::CarriedTerm::flops + M::more_flops,
+                60, 25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
     PassResult run_force(const StepInput& in, std::span<const Index> clusters)
     {
@@ -66,7 +69,9 @@ private:
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
         ForceSums<Wide> sums;
         // every particle meets itself once in its list
-        tally.pairs += sum_forces(i, near, sums) - std::popcount(i.moving);
+        const bool carries = Below::shifting() && in.shifts;
+        tally.pairs +=
+            (carries ? sum_forces<M::shifts>(in, i, near, sums) : sum_forces<false>(in, i, near, sums)) - std::popcount(i.moving);
         unsigned awake = 0;
         if (in.sleep == SleepStage::Freeze) awake = awake_near(i, near, kinematics_.data(), stresses_.data(), 2 * model_.kernel.h);
         ForceWalls<Wide> walls{};
@@ -76,8 +81,8 @@ private:
         if (moving) power = {}, tally.pairs += sum_wall_forces<true>(in, i, runs, stress_of(in, i), walls, &power);
         else if (!runs.empty()) tally.pairs += sum_wall_forces<false>(in, i, runs, stress_of(in, i), walls, nullptr);
         ForceWalls<Wide> loaded;
-        const bool pressed = !runs.empty() && any_pressure(in, i);
-        if (pressed) loaded = {}, sum_wall_forces<false>(in, i, runs, pressure_of(in, i), loaded, nullptr);
+        const bool pressed = !runs.empty() && Below::any_pressure(in, i);
+        if (pressed) loaded = {}, sum_wall_forces<false>(in, i, runs, Below::pressure_of(in, i), loaded, nullptr);
         Below::for_each_register(
             i, [&](const Lanes& lanes) __attribute__((always_inline)) {
                 update_force(in, sums, walls, !runs.empty(), moving ? &power : nullptr, pressed ? &loaded : nullptr, lanes, awake, tally);
@@ -89,35 +94,23 @@ private:
         const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
         return {narrow(0), narrow(1), narrow(2), narrow(3), narrow(4), narrow(5)};
     }
-    static LoadNow load_on(const StepInput& in, Index i)
+    KUZURE_INLINE static bool any(Vec3<V> a)
     {
-        const std::int32_t number = std::as_const(*in.particles)[field::load][i];
-        return number > 0 ? in.loads[std::size_t(number) - 1] : LoadNow{};
+        const V none(T(0)), most = max(max(abs(a.x), abs(a.y)), abs(a.z));
+        return bits(less(none, most)) != 0;
     }
-    /// True where a pressure that follows its face acts on one of the cluster's particles.
-    static bool any_pressure(const StepInput& in, const Cluster<V>& i)
-    {
-        bool any = false;
-        for (int k = 0; !in.loads.empty() && k < i.count; ++k) any = any || load_on(in, i.first + k).pressure != 0;
-        return any;
-    }
-    /// Those pressures as stresses, in tension.
-    static Sym3<V> pressure_of(const StepInput& in, const Cluster<V>& i)
-    {
-        T p[W];
-        for (int k = 0; k < W; ++k) p[k] = k < i.count ? T(load_on(in, i.first + k).pressure) : T(0);
-        const V all = load<V>(p), zero(T(0));
-        return {all, all, all, zero, zero, zero};
-    }
-
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
-    KUZURE_INLINE std::int64_t sum_forces(const Cluster<V>& i, std::span<const Index> near, ForceSums<Wide>& out) const
+    /// `carries`: this step shifts particles, which carry stress along.
+    template <bool carries>
+    KUZURE_INLINE std::int64_t sum_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, ForceSums<Wide>& out) const
     {
         const Kinematics<T>* neighbours = kinematics_.data();
         const Stresses<T>* records = stresses_.data();
         const auto at = Below::lengths();
         const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Below::in_tension(i, tension_);
+        const Vec3<V> shift = Below::shift_of(in, i, carries);
+        const bool shifted = carries && any(shift);
         Batch<V> batch;
         ForceSums<V> sums{};
         V inside = zero;
@@ -145,6 +138,8 @@ private:
                     sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
                 if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
                 if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
+                if constexpr (carries)
+                    if (shifted) CarriedStress{}.add(sums, batch, records, shift);
                 std::apply([&](const auto&... term) { (term.add(sums, batch, records), ...); }, model_.more);
             });
         widen<V>(sums, out);
@@ -223,7 +218,8 @@ private:
             artificial = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
-        if constexpr (M::diffusive) diffuse(in, sums, sigma, soil, lanes);
+        if (M::diffusive || (Below::shifting() && in.shifts)) rate_of_stress(in, sums, sigma, soil, lanes);
+        if (Below::shifting() && in.shifted) artificial = artificial + was[field::shift_acceleration].template load<U>(lanes.at);
         if (walled) {
             Watts watts{zero, zero};
             wall = wall_acceleration(in, wall_sums, lanes, U(volume_) * soil.rho0 / rho, rho, power, watts);
@@ -235,7 +231,12 @@ private:
         if (p.has(field::wall_force)) tell_of_walls(p, lanes, wall, walled);
         Vec3<U> body = body_acceleration(in.forces, water_, was[field::position], soil.rho0, lanes);
         if (!in.loads.empty()) {
-            by_loads = load_acceleration(in, U(2.0) * per_rho * sums.grad_one, loaded, lanes, soil.rho0, rho);
+            Vec3<U> at_walls;
+            if (loaded) {
+                const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Wide>, W>(*loaded, lanes.first);
+                at_walls = w.held + w.pressing;
+            }
+            by_loads = Below::load_acceleration(in, U(2.0) * per_rho * sums.grad_one, loaded ? &at_walls : nullptr, lanes, soil.rho0, rho);
             body = body + by_loads;
             if (p.has(field::unstored)) p[field::unstored].store(lanes.at, (viscous + artificial) + (wall + by_loads), lanes.n);
         }
@@ -251,26 +252,6 @@ private:
         if (in.sleep == SleepStage::Detect || in.sleep == SleepStage::Freeze) Below::detect_calm(in, lanes, a, v, awake);
 
         report(in, lanes, Moved{x, u, v, a}, Forces{viscous, artificial, wall, by_loads}, U(volume_) * soil.rho0, walled, tally);
-    }
-    /// What loads do to each lane, m/s^2. A pressure p that follows its face is what a tension p of the particle and of all around it would
-    /// do, sum_j V_j 2 p grad W and at walls sum f P (p grad W): nothing inside soil and beside walls, p on the area of a free face.
-    /// `inward`: of a unit of pressure without walls.
-    KUZURE_INLINE Vec3<U> load_acceleration(const StepInput& in, Vec3<U> inward, const ForceWalls<Wide>* wall_sums, const Lanes& lanes,
-                                            U rho0, U rho) const
-    {
-        auto& p = *in.particles;
-        const auto push = p[field::load_push];
-        const U mass = U(volume_) * rho0;
-        Vec3<U> a = lane_by_lane<U>([&](int k) { return load_on(in, lanes.particle(k)).pressure; }) * inward;
-        if (wall_sums) {
-            const auto w = lanes_at<U, ForceWalls<U>, ForceWalls<Wide>, W>(*wall_sums, lanes.first);
-            a = a + (U(scale_) * mass / (rho * rho)) * (w.held + w.pressing);
-        }
-        for (int k = 0; k < lanes.n; ++k)
-            if (load_on(in, lanes.at + k).measured)
-                push.set(lanes.at + k, lane(mass, k) * Vector{lane(a.x, k), lane(a.y, k), lane(a.z, k)});
-        const U share = lane_by_lane<U>([&](int k) { return load_on(in, lanes.particle(k)).share; });
-        return a + (share / mass) * std::as_const(p)[field::load_push].template load<U>(lanes.at);
     }
     /// All that walls do to each lane; of viscosity the strain stage has left it.
     static void tell_of_walls(Particles& p, const Lanes& lanes, Vec3<U> wall, bool walled)
@@ -298,6 +279,8 @@ private:
         const U magic(magic_of(in.energy_unit));
         const auto mine = written<U>(lanes);
         const Vec3<U> coming = fma(half_next, m.a, m.v);
+        Vec3<U> way = coming;
+        if (Below::shifting() && in.shifts) way = way + p[field::shift].template load<U>(lanes.at);
         const auto take = [&](U& before, U& later, Vec3<U> force) {
             before -= select(mine, quantized(mass * (half_dt * dot(force, m.u)), magic), zero);
             later -= select(mine, quantized(mass * (half_next * dot(force, coming)), magic), zero);
@@ -308,8 +291,7 @@ private:
         if (!in.loads.empty()) take(tally.energy.loads, tally.later.loads, f.loads);
         if (in.forces.damping > 0) take(tally.energy.damping, tally.later.damping, -(half * mu) * (m.u + coming));
         const Vec3<U> frame{U(in.frame.x), U(in.frame.y), U(in.frame.z)}, flown{U(in.frame_way.x), U(in.frame_way.y), U(in.frame_way.z)};
-        const Vec3<U> moved = (fma(next, coming, m.x) - p[field::sorted_position].template load<U>(lanes.at)) - flown,
-                      drift = coming - frame;
+        const Vec3<U> moved = (fma(next, way, m.x) - p[field::sorted_position].template load<U>(lanes.at)) - flown, drift = way - frame;
         const auto meet = [&](U& most, U value) { most = max(select(mine, value, zero), most); };
         meet(tally.maxima.acceleration2, dot(m.a, m.a));
         meet(tally.maxima.displacement2, dot(moved, moved));
@@ -322,21 +304,32 @@ private:
             if (any_outside(in, at, lanes.n)) tally.maxima.outside = U(1.0);
         }
     }
-    /// Stress rate of the diffusion, kept for the next strain.
-    KUZURE_INLINE void diffuse(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
-                               const Lanes& lanes) const
+    /// Stress rate of diffusion and shifting, kept for the next strain.
+    KUZURE_INLINE void rate_of_stress(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
+                                      const Lanes& lanes) const
     {
         auto& p = *in.particles;
+        Sym3<U> rate{};
+        if constexpr (M::diffusive) rate = diffusion(in, sums, sigma, soil, lanes);
+        if constexpr (M::shifts)
+            if (Below::shifting() && in.shifts) {
+                const Vec3<U> shift = std::as_const(p)[field::shift].template load<U>(lanes.at);
+                rate = rate + U(scale_) * (sums.carried - dot(shift, sums.grad_one) * sigma);
+            }
+        const auto kept = p[field::stress_rate];
+        if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
+        kept.store(lanes.at, rate, lanes.n);
+    }
+    KUZURE_INLINE Sym3<U> diffusion(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
+                                    const Lanes& lanes) const
+    {
         const auto material = [&](int k) -> const Material& {
-            return in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][lanes.particle(k)]];
+            return in.soils[in.soils.size() == 1 ? 0 : std::as_const(*in.particles)[field::soil][lanes.particle(k)]];
         };
         const U speed = lane_by_lane<U>([&](int k) { return material(k).c_bar; });
         const U K0 = lane_by_lane<U>([&](int k) { return material(k).K0; });
         const U strength = U(2 * model_.stress_diffusion.zeta * h_ * scale_ / unit_) * speed;
-        const auto kept = p[field::stress_rate];
-        Sym3<U> rate = model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));
-        if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
-        kept.store(lanes.at, rate, lanes.n);
+        return model_.stress_diffusion.rate(sums, sigma, soil.rho0, K0, strength, U(unit_));
     }
     /// Soil with no wall around has none of a contact before.
     static void forget_contact(Particles& p, const Lanes& lanes)

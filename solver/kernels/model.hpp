@@ -2,6 +2,7 @@
 // A model is a smoothing kernel and the terms of the pair loop: its type says what the loop contains.
 #include "solver/effects/artificial_stress.hpp"
 #include "solver/effects/gradient_correction.hpp"
+#include "solver/effects/shifting.hpp"
 #include "solver/effects/stress_diffusion.hpp"
 #include "solver/effects/viscosity.hpp"
 #include "solver/pairs/sums.hpp"
@@ -15,17 +16,20 @@ namespace kuzure {
 /// scheme. Each has its Sums<V>, flops, from(interactions, unit), add(sums, batch, stresses of neighbours) and force(sums), which is
 /// rho_i dv_i/dt without the kernel's constant, Pa/m; what it does to the energy is booked as stabilising.
 template <class KernelType, class Viscous, class Tensile = NoArtificialStress, class Diffusive = NoStressDiffusion,
-          class Corrected = NoCorrection, class... More>
+          class Corrected = NoCorrection, class Shifted = NoShifting, class... More>
 struct Model {
     using Kernel = KernelType;
     using ArtificialStressTerm = Tensile;
     using DiffusionTerm = Diffusive;
     using CorrectionTerm = Corrected;
+    using ShiftingTerm = Shifted;
     static constexpr bool viscous = !std::is_same_v<Viscous, NoViscosity>;
     static constexpr bool tensile = std::is_same_v<Tensile, ArtificialStress>;
     static constexpr bool diffusive = std::is_same_v<Diffusive, StressDiffusion>;
     static constexpr bool corrected = std::is_same_v<Corrected, GradientCorrection>;
-    static constexpr bool pushes = tensile || sizeof...(More) > 0;
+    static constexpr bool shifts = std::is_same_v<Shifted, Shifting>;
+    using CarriedTerm = std::conditional_t<shifts, CarriedStress, NothingCarried>;
+    static constexpr bool pushes = tensile || shifts || sizeof...(More) > 0;
     static constexpr double more_flops = (0.0 + ... + More::flops);
     template <class S, class... Terms> using WithMore = SumsOf<S, Terms..., More...>;
     Kernel kernel;
@@ -34,6 +38,7 @@ struct Model {
     Diffusive stress_diffusion;
     Corrected correction;
     bool correct; // a model with the correction compiled in also serves scenes without
+    Shifted shifting;
     std::tuple<More...> more;
 
     static Model from(const scene::Interactions& s, double unit)
@@ -45,6 +50,7 @@ struct Model {
                 Diffusive::from(s.effects),
                 {},
                 s.correction == scene::Correction::Gradient,
+                Shifted::from(s.shifting, kernel, s.spacing / unit),
                 {More::from(s, unit)...}};
     }
     static bool covers(const scene::Interactions& s)
@@ -54,7 +60,8 @@ struct Model {
                           : std::is_same_v<Kernel, WendlandC2> ? asked == scene::Kernel::WendlandC2
                                                                : asked == scene::Kernel::WendlandC4;
         return same && Viscous::covers(s.effects) && (tensile || !s.effects.artificial_stress) &&
-               (diffusive || !s.effects.stress_diffusion) && (corrected || s.correction == scene::Correction::None);
+               (diffusive || !s.effects.stress_diffusion) && (corrected || s.correction == scene::Correction::None) &&
+               (shifts || s.shifting == 0);
     }
     static std::string name()
     {
@@ -65,6 +72,7 @@ struct Model {
         if (tensile) s += " + artificial stress";
         if (diffusive) s += " + stress diffusion";
         if (corrected) s += " + gradient correction";
+        if (shifts) s += " + shifting";
         return s;
     }
 };

@@ -38,7 +38,9 @@ struct StepInput {
     double kick;       // half of the step before and half of this one, s
     double next;       // length of the step to come, s
     StepForces forces;
-    bool evolving = false;    // a soil's cone changes with strain or its rate
+    bool evolving = false; // a soil's cone changes with strain or its rate
+    /// Where particles are shifted: this step decides how those of the next are; its own move has shifted them.
+    bool shifts = false, shifted = false;
     bool remembering = false; // a soil remembers opened volume: `particles` has field::opened_volume
     Vector frame{};           // m/s, how fast the whole scene flies past; largest speeds and displacements are against it
     Vector frame_way{};       // m, how far it will have flown since the last sort, after the step whose displacement is told

@@ -3,12 +3,15 @@
 // are those of by_the_book.hpp; what is its own are the moments at which they are taken, and walls as one surface.
 // Beyond 400 lines: all equations of a step on one page, to be read and compared as a whole.
 //
-//     strain   x, v, rho, sigma after the move; all distances half a step back, r_ij = x_ij - dt/2 v_ij:
+//     strain   x, v, rho, sigma after the move; all distances half a step back, r_ij = x_ij - dt/2 (v_ij + w_ij):
 //              L_i = sum_j V_j (v_j - v_i) (x) grad W - sum_w V_w 2 P_w v_i (x) grad W,  w points of walls,
 //              b_i = -1/rho_i sum_j V_j rho_i rho_j Pi_ij grad W  (of walls: v_iw = 2 P_w v_i, and of the force P_w)
 //              sigma, rho by a whole step: half of the loading before the turn and half after
+//              where particles are shifted, w_i = -n C h^2 gamma' k_i grad C_i of effects/shifting.hpp for the step to come, in one of n =
+//              4
 //     force    a_i = b_i + g + 1/rho_i sum_j V_j [sigma_i + sigma_j + f^n (tau_i + tau_j)] . grad W
 //                    + 1/rho_i sum_w V_w 2 P_w (sigma_i . grad W) + friction;  v_i += dt/2 a_i
+//              a_i += L_i w_i of the step before; sum_j V_j (sigma_j - sigma_i) (w_i . grad W) is a stress rate of the next strain
 //              of soil behind the face of real ground that its nearest point there mirrors it at, by a depth of d: also
 //              a spring n omega^2 d, omega = 0.3 c_p/h
 //
@@ -212,8 +215,9 @@ struct Kept {
     Vector slip{};
     double pressed = 0, friction = 0; // the latter: the most that it carries
     double plastic_strain = 0, opened = 0;
-    double pressure = 0; // of a load that follows its face, Pa
-    Vector push{};       // of one that does not, N
+    double pressure = 0;                  // of a load that follows its face, Pa
+    Vector push{};                        // of one that does not, N
+    Vector shift{}, shift_acceleration{}; // m/s, m/s^2
 };
 constexpr double mirror = 2; // (v_i - v_w)/v_i of what a wall point mirrors
 
@@ -224,32 +228,44 @@ struct Strain {
     bool beside_wall = false;
     double power = 0, next_power = 0; // of moving walls by viscosity, in this step and the next, W/kg
     double friction = 0;              // the most that it carries, without what this step's stress allows, m/s^2
+    Vector crowd{};                   // grad C, 1/m
+    double inside = 0;                // tr M/d, walls among the neighbours
 };
-inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt)
+/// 1 + 0.2 (W/W(spacing))^4: neighbours count more the nearer they are. Lind et al. (2012), eq. 26.
+inline double crowding(const Kernel& kernel, double spacing, double r)
+{
+    return 1 + 0.2 * std::pow(kernel.value(r) / kernel.value(spacing), 4);
+}
+inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> kept, std::span<const GroundPoint> points, const Setting& s,
+                        double dt)
 {
     const Kernel kernel = s.kernel();
     const auto& viscous = s.how.effects.viscosity;
     const Particle i = particle(soil, k, s);
     // As it stands at mid-step, seen from where j stands then.
-    const auto at_mid_step = [&](Particle j) {
-        j.x = j.x - (dt / 2) * j.v;
+    const auto at_mid_step = [&](Particle j, Vector shift) {
+        j.x = j.x - (dt / 2) * (j.v + shift);
         return j;
     };
-    const Particle here = at_mid_step(i);
+    const Particle here = at_mid_step(i, kept[k].shift);
     Strain of_i;
     Matrix M{}, sliding{};
     Vector pressure{}; // sum V_j rho_i rho_j Pi grad W
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         if (l == k) continue;
-        const Particle j = at_mid_step(particle(soil, l, s));
+        const Particle j = at_mid_step(particle(soil, l, s), kept[l].shift);
         const Vector grad = kernel.gradient(here.x - j.x);
         of_i.L = of_i.L + j.volume * outer(j.v - i.v, grad);
         M = M + j.volume * outer(j.x - here.x, grad);
+        of_i.crowd = of_i.crowd + (j.volume * crowding(kernel, s.how.spacing, length(here.x - j.x))) * grad;
         if (viscous) pressure = pressure + (j.volume * i.density * j.density * viscosity(*viscous, s.how.h, here, j, i.v - j.v)) * grad;
     }
+    of_i.inside = trace(M) / s.how.dimensions;
     for (const GroundPoint& w : points) {
         const Vector r = here.x - w.x, grad = kernel.gradient(r);
         if (w.faces.empty() || grad == Vector{}) continue;
+        of_i.crowd = of_i.crowd + (i.volume * crowding(kernel, s.how.spacing, length(r))) * grad;
+        of_i.inside -= i.volume * dot(r, grad) / s.how.dimensions;
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector mirrored = mirror * crossing(wall, face, i.v - velocity_of(w, face, s.motion)); // v_iw
@@ -269,9 +285,9 @@ inline Strain strain_of(std::size_t k, const Soil& soil, const Kept& kept, std::
     }
     // The limit of friction follows what presses: d limit/dt = (tan(delta) p - limit)/lag, lag = 4 h/c_p, implicit.
     const double lag = 4 * s.how.h / s.soils[std::size_t(soil.soil[k])].c_p;
-    of_i.friction = dt > 0 ? (lag * kept.friction + dt * of_i.friction) / (lag + dt) : of_i.friction;
+    of_i.friction = dt > 0 ? (lag * kept[k].friction + dt * of_i.friction) / (lag + dt) : of_i.friction;
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
-    if (kept.pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
+    if (kept[k].pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
@@ -286,6 +302,7 @@ struct Strained {
     Stress stress;
     double density, plastic_strain, opened;
     double plastic, stabilising, wall;
+    Vector shift{}, shift_acceleration{}; // m/s, m/s^2
 };
 inline Strained strained(const Particle& i, const Material& soil, const Kept& kept, const Strain& strain, const Setting& s, double dt)
 {
@@ -307,6 +324,13 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
     next.plastic = volume * (dt * kuzure::contract(mean, D) + diffused - stored);
     next.stabilising = -volume * diffused;
     next.wall = -volume * dt * contract(mean, strain.L_walls);
+    if (s.how.shifting == 0) return next;
+    // The way beside the velocity changes the potential energy.
+    const Vector weight = s.how.effects.gravity.value_or(Vector{}) + (-1 / soil.density) * PoreWater::from(s.how.effects).at(i.x).gradient;
+    next.stabilising += mass * dt * dot(weight, kept.shift);
+    next.shift_acceleration = {dot(strain.L.x, kept.shift), dot(strain.L.y, kept.shift), dot(strain.L.z, kept.shift)};
+    const double h = s.how.h, k = std::clamp((strain.inside - 0.75) / 0.15, 0.0, 1.0); // 0 at free surfaces, 1 inside
+    next.shift = (-8 * s.how.shifting * h * h * (mapped.d_lambda / dt) * k) * strain.crowd;
     return next;
 }
 
@@ -358,6 +382,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
         if (e.stress_diffusion)
             of_i.stress_rate = of_i.stress_rate + stress_diffusion(e.stress_diffusion->zeta, s.how.h, gravity, material, i, j, grad);
+        if (s.how.shifting > 0) of_i.stress_rate = of_i.stress_rate + (j.volume * dot(kept.shift, grad)) * (j.stress - i.stress);
     }
     for (const GroundPoint& w : points) {
         const Vector r = i.x - w.x, grad = kernel.gradient(r);
@@ -420,6 +445,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     // A pressure on free faces is what a tension of the particle and of all around it would do.
     const double mass = i.density * i.volume;
     const Vector load = (kept.pressure / i.density) * inward + (1 / mass) * kept.push;
+    if (s.how.shifting > 0) art = art + i.density * kept.shift_acceleration;
     const Vector free = (1 / i.density) * (stress + art) + kept.acceleration + by_walls + gravity + water + load;
     // Damping over the whole kick, with the mean of the velocities before and after it: a = free - mu (v- + v+)/2, v+ = v- + kick a.
     const double kick = (dt + next) / 2;

@@ -21,6 +21,10 @@ template <class T> struct alignas(8 * sizeof(T)) Stresses {
     T xx, yy, zz, xy, yz, xz;
     T volume, awake;
 };
+/// How it is shifted beside that, m/s; only models that shift particles read and write it.
+template <class T> struct alignas(4 * sizeof(T)) ShiftOf {
+    T x, y, z, spare;
+};
 static_assert(sizeof(Kinematics<double>) == 64 && sizeof(Stresses<float>) == 32);
 
 /// Stages are layers over this class: each adds one pass (strain.hpp, force.hpp), a scheme puts them together (staggered.hpp).
@@ -35,14 +39,16 @@ public:
     void require_fields(Particles& p, bool coulomb) const override
     {
         p.require(field::acceleration);
-        if (M::diffusive) p.require(field::stress_rate);
+        if (M::diffusive || shifting()) p.require(field::stress_rate);
+        if (shifting()) p.require(field::shift, field::shift_acceleration);
         if (coulomb) p.require(field::wall_slip, field::wall_pressure, field::wall_friction);
     }
     void start(Particles&) const override {}
     std::size_t bytes() const override
     {
         return kinematics_.capacity() * sizeof(Kinematics<T>) + stresses_.capacity() * sizeof(Stresses<T>) +
-               tension_.capacity() * sizeof(Tension<T>) + speed_.capacity() * sizeof(T) + wall_bytes();
+               tension_.capacity() * sizeof(Tension<T>) + shifts_.capacity() * sizeof(ShiftOf<T>) + speed_.capacity() * sizeof(T) +
+               wall_bytes();
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
@@ -51,6 +57,7 @@ public:
         const std::size_t count = std::size_t(n) + ghost_soil.size() + Particles::padding + 1;
         kinematics_.resize(count), stresses_.resize(count);
         if (M::tensile) tension_.resize(count);
+        if (shifting()) shifts_.resize(count);
         if (soils.size() > 1) speed_.resize(count);
         const bool sleepy = p.has(field::activity);
 #pragma omp parallel for schedule(static)
@@ -63,11 +70,13 @@ public:
             const bool awake = sleepy && p[field::activity][i] == std::int32_t(Activity::Moves);
             stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
             if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
+            if (shifting()) shifts_[i] = shift_of(p[field::shift][i]);
         }
         for (std::size_t k = n; k < count; ++k) {
             kinematics_[k] = far_away<T, Kinematics>();
             stresses_[k] = {};
             if (M::tensile) tension_[k] = {};
+            if (shifting()) shifts_[k] = {};
         }
         if (soils.size() > 1) {
             for (Index i = 0; i < n; ++i) speed_[i] = T(soils[p[field::soil][i]].c_p);
@@ -135,6 +144,7 @@ public:
             Kinematics<T> r = kinematics_[owned];
             r.x = fixed_.sum(r.x, fixed_(shift.x)), r.y = fixed_.sum(r.y, fixed_(shift.y)), r.z = fixed_.sum(r.z, fixed_(shift.z));
             std::memcpy(to, &r, sizeof r);
+            if (shifting()) std::memcpy(to + sizeof r, &shifts_[owned], sizeof(ShiftOf<T>));
             return;
         }
         std::memcpy(to, &stresses_[owned], sizeof(Stresses<T>));
@@ -144,6 +154,7 @@ public:
     {
         if (stage == 0) {
             std::memcpy(&kinematics_[n_ + slot], from, sizeof(Kinematics<T>));
+            if (shifting()) std::memcpy(&shifts_[n_ + slot], from + sizeof(Kinematics<T>), sizeof(ShiftOf<T>));
             return;
         }
         std::memcpy(&stresses_[n_ + slot], from, sizeof(Stresses<T>));
@@ -157,6 +168,7 @@ public:
         auto& p = *in.particles;
         const Index n = p.size();
         const U dt(in.dt), half_dt = U(0.5) * dt;
+        const bool shifted = shifting() && in.shifted;
         const auto x = p[field::position], v = p[field::velocity];
         const auto a = std::as_const(p)[field::acceleration];
         const auto rho = std::as_const(p)[field::density];
@@ -167,7 +179,9 @@ public:
         for (Index at = 0; at < n; at += width<U>) {
             const int lanes = std::min<Index>(width<U>, n - at);
             const Vec3<U> x0 = x.template load<U>(at), v0 = v.template load<U>(at);
-            Vec3<U> u = fma(half_dt, a.template load<U>(at), v0), x1 = fma(dt, u, x0);
+            Vec3<U> u = fma(half_dt, a.template load<U>(at), v0), way = u;
+            if (shifted) way = way + std::as_const(p)[field::shift].template load<U>(at);
+            Vec3<U> x1 = fma(dt, way, x0);
             if (activity) {
                 double awake[width<U>];
                 for (int k = 0; k < width<U>; ++k) awake[k] = k < lanes && activity[at + k] != std::int32_t(Activity::Asleep);
@@ -183,6 +197,7 @@ public:
                 kinematics_[at + k] = {
                     fixed_(here.x), fixed_(here.y), fixed_(here.z), T(moving.x), T(moving.y), T(moving.z), T(volume_ * m.density / density),
                     T(density)};
+                if (shifted) shifts_[at + k] = shift_of(std::as_const(p)[field::shift][at + k]);
             }
         }
     }
@@ -191,6 +206,22 @@ protected:
     using Base::unit_, Base::h_, Base::volume_, Base::model_, Base::fixed_;
     using typename Base::T, typename Base::U;
 
+    /// True where this run shifts particles: a model that can also serves scenes without.
+    bool shifting() const
+    {
+        if constexpr (M::shifts) return model_.shifting.constant > 0;
+        else return false;
+    }
+    /// Velocities at which lanes are shifted; none but where `counts`.
+    KUZURE_INLINE Vec3<V> shift_of(const StepInput& in, const Cluster<V>& i, bool counts) const
+    {
+        const V none(T(0));
+        if (!shifting() || !counts) return {none, none, none};
+        const auto s = std::as_const(*in.particles)[field::shift];
+        const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
+        return {narrow(0), narrow(1), narrow(2)};
+    }
+    static ShiftOf<T> shift_of(Vector w) { return {T(w.x), T(w.y), T(w.z), T(0)}; }
     std::size_t wall_bytes() const
     {
         std::size_t b = 0;
@@ -252,6 +283,7 @@ protected:
     Array<Kinematics<T>> kinematics_;
     Array<Stresses<T>> stresses_;
     Array<Tension<T>> tension_;
+    Array<ShiftOf<T>> shifts_;
     Array<T> speed_; // c_p by record, where there are several soils
 };
 

@@ -30,12 +30,12 @@ template <class Below> class StrainStage : public Below {
 
 protected:
     using Below::W, Below::unit_, Below::dimensions_, Below::h_, Below::volume_, Below::model_, Below::scale_, Below::kinematics_,
-        Below::stresses_, Below::tension_, Below::speed_, Below::walls_;
+        Below::stresses_, Below::tension_, Below::speed_, Below::walls_, Below::water_;
     using typename Below::T, typename Below::U;
     using Viscous = std::conditional_t<M::viscous, ViscousForce, NoViscousForce>;
 
     /// What walls add to the sums of a cluster; over wall points j of volume 1, f_ij the mirror factor.
-    template <class S> struct StrainWalls {
+    template <class S> struct StrainWalls : M::ShiftingTerm::template Sums<S> {
         Mat3<S> mirrored, sliding; // sum f (P v_i) (x) grad W; of Coulomb faces apart
         Vec3<S> viscous;           // sum rho_i rho_j Pi P grad W
         S rubbing;                 // sum tan(delta) rho_i rho_j Pi n.grad W of Coulomb faces
@@ -45,18 +45,19 @@ protected:
     template <class S> struct ViscousPower {
         S now, next;
     };
-    template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm>;
+    template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm, typename M::ShiftingTerm>;
     using Wide = WideLanes<W>;
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
 
     /// Geometry: r and its half step 9, v 3, r.r 5, densities and softening 3, reciprocals 5, length 1, t 2, F and volume 8, grad W 3;
     /// viscosity: approach 6, pressure 6. Update: scaled sums 12, rotation 110, increments 40, return to the cone 40, energies 60.
-    static Stage strain_stage()
+    Stage strain_stage() const
     {
-        return {"strain", sizeof(Kinematics<T>),
-                39 + (M::viscous ? 12.0 : 0.0) + VelocityGradient::flops + Viscous::flops + M::CorrectionTerm::flops, 262,
-                23 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
+        return {"strain", sizeof(Kinematics<T>) + (Below::shifting() ? sizeof(ShiftOf<T>) : 0),
+                39 + (M::viscous ? 12.0 : 0.0) + VelocityGradient::flops + Viscous::flops + M::CorrectionTerm::flops +
+                    M::ShiftingTerm::flops,
+                262, 23 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
     PassResult run_strain(const StepInput& in, std::span<const Index> clusters)
     {
@@ -75,7 +76,8 @@ private:
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
         const auto near = Below::near(i, in, cluster, kinematics_.data());
         StrainSums<Wide> sums;
-        sum_strain(in, i, near, sums);
+        if (Below::shifting() && (in.shifts || in.shifted)) sum_strain<M::shifts>(in, i, near, sums);
+        else sum_strain<false>(in, i, near, sums);
         StrainWalls<Wide> walls{};
         const auto runs = in.lists->walls(cluster);
         if (!runs.empty()) {
@@ -101,6 +103,8 @@ private:
         Below::book_work_of_walls(in, lanes, watts * power.now, watts * power.next, tally.energy.viscous, tally.later.viscous, tally);
     }
 
+    /// `shifting`: this step shifts particles, or decides how the next does.
+    template <bool shifting>
     KUZURE_INLINE void sum_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> near, StrainSums<Wide>& out) const
     {
         const Kinematics<T>* records = kinematics_.data();
@@ -108,6 +112,9 @@ private:
         const T* speed = one_soil ? nullptr : speed_.data();
         const auto at = Below::lengths();
         const V support = at.support, softening = at.softening, tiny = at.tiny, zero(T(0)), half_dt(T(0.5 * in.dt / unit_));
+        [[maybe_unused]] const bool shifted = in.shifted, decides = in.shifts;
+        const ShiftOf<T>* shifts = Below::shifts_.data();
+        const Vec3<V> own = Below::shift_of(in, i, in.shifted);
         Batch<V> batch;
         StrainSums<V> sums{};
         Below::for_each_batch(
@@ -116,7 +123,11 @@ private:
                     const Kinematics<T>& j = records[batch.neighbour[k]];
                     Entry<V>& e = batch.at[k];
                     const Vec3<V> v{j.vx - i.v.x, j.vy - i.v.y, j.vz - i.v.z};
-                    const Vec3<V> r = fma(half_dt, v, i.position.minus(j)); // half a step back
+                    Vec3<V> r = fma(half_dt, v, i.position.minus(j)); // half a step back
+                    if (shifting && shifted) {
+                        const ShiftOf<T>& w = shifts[batch.neighbour[k]];
+                        r = fma(half_dt, Vec3<V>{w.x - own.x, w.y - own.y, w.z - own.z}, r);
+                    }
                     const V r2 = max(dot(r, r), tiny);
                     const V rho_sum = i.rho + j.density;
                     const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
@@ -129,11 +140,15 @@ private:
                         const V c = one_soil ? i.c : V(speed[batch.neighbour[k]]);
                         e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
                     }
-                    if constexpr (M::corrected) e.r = r;
+                    if constexpr (M::corrected || shifting) e.r = r;
+                    if constexpr (shifting)
+                        if (decides) e.w = model_.kernel.value(t);
                 }
                 VelocityGradient{}.add(sums, batch);
                 Viscous{}.add(sums, batch);
                 if constexpr (M::corrected) model_.correction.add(sums, batch);
+                if constexpr (shifting)
+                    if (decides) model_.shifting.add(sums, batch);
             });
         widen<V>(sums, out);
     }
@@ -143,7 +158,7 @@ private:
                                            ViscousPower<Wide>* power_out) const
     {
         const V half_dt(T(0.5 * in.dt / unit_));
-        const Vec3<V> back{half_dt * i.v.x, half_dt * i.v.y, half_dt * i.v.z};
+        const Vec3<V> way = i.v + Below::shift_of(in, i, in.shifted), back{half_dt * way.x, half_dt * way.y, half_dt * way.z};
         StrainWalls<V> sums{};
         ViscousPower<V> power{};
         Below::template for_each_wall_pair<moving>(i, runs, back, [&](Vec3<V> r, V r2, unsigned, const Mirror<V>& m) {
@@ -151,7 +166,13 @@ private:
             const V zero(T(0));
             const V rho_sum = i.rho + i.rho;
             const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
-            const Vec3<V> g = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root) * r;
+            const V t = max(support - inv.root, zero);
+            const Vec3<V> g = model_.kernel.F(t, inv.root, inv.inverse_root) * r;
+            if constexpr (M::shifts)
+                if (in.shifts) {
+                    sums.crowd = fma(model_.shifting.crowding(model_.kernel.value(t)), g, sums.crowd);
+                    sums.spread = sums.spread + dot(r, g);
+                }
             Vec3<V> v = i.v;
             if constexpr (moving) v = v - m.v;
             const Vec3<V> Pv = m.factor * project(m, v);
@@ -259,7 +280,7 @@ private:
         const Sym3<U> D = symmetric_part(L);
         if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
         Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
-        if constexpr (M::diffusive) diffusion = was[field::stress_rate].template load<U>(lanes.at);
+        if (M::diffusive || (Below::shifting() && in.shifted)) diffusion = was[field::stress_rate].template load<U>(lanes.at);
         // half before the turn and half after: second order in time, and exact in energy
         const Sym3<U> strain = dt * D;
         const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
@@ -268,11 +289,43 @@ private:
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
+        if (Below::shifting()) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
 
         keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
+    }
+    /// The way beside its velocity that a particle goes in the step to come, and what this step's has changed: its velocity, and its
+    /// potential energy, which is booked here whole.
+    KUZURE_INLINE void shift(const StepInput& in, const StrainSums<Wide>& soil_sums, const StrainWalls<Wide>& wall_sums, bool walled,
+                             const Lanes& lanes, const LaneSoil<U>& soil, U rho, const Mat3<U>& L, U sheared, Tally<U>& tally) const
+    {
+        if constexpr (M::shifts) {
+            if (!(in.dt > 0)) return; // what is to come was decided before
+            auto& p = *in.particles;
+            const auto shifted = p[field::shift], carried = p[field::shift_acceleration];
+            const auto mine = written<U>(lanes);
+            const U none(0.0), mass = U(volume_) * soil.rho0, factor(scale_), dt(in.dt);
+            if (in.shifted) {
+                const Vec3<U> w = shifted.template load<U>(lanes.at);
+                const Vec3<U> body = body_acceleration(in.forces, water_, std::as_const(p)[field::position], soil.rho0, lanes);
+                const U fallen = quantized(mass * (dt * dot(body, w)), U(magic_of(in.energy_unit)));
+                tally.energy.stabilising += select(mine, fallen, none);
+                carried.store(lanes.at, select(mine, Vec3<U>{dot(L.x, w), dot(L.y, w), dot(L.z, w)}, Vec3<U>{none, none, none}), lanes.n);
+            }
+            if (!in.shifts) return;
+            const auto sums = lanes_at<U, StrainSums<U>, StrainSums<Wide>, W>(soil_sums, lanes.first);
+            Vec3<U> crowd = sums.crowd;
+            U spread = sums.spread;
+            if (walled) {
+                const auto w = lanes_at<U, StrainWalls<U>, StrainWalls<Wide>, W>(wall_sums, lanes.first);
+                crowd = fma(mass / rho, w.crowd, crowd), spread = fma(mass / rho, w.spread, spread);
+            }
+            const U inside = Shifting::inside(U(-unit_ / dimensions_) * factor * spread);
+            const U strength = U(-Shifting::every * model_.shifting.constant * h_ * h_) * inside * (sheared / dt);
+            shifted.store(lanes.at, select(mine, (strength * factor) * crowd, Vec3<U>{none, none, none}), lanes.n);
+        }
     }
     struct Strain { // of one step: stress and density before and after, rate of strain, stress rate of the diffusion, L of the walls
         Sym3<U> before, after;
@@ -292,7 +345,8 @@ private:
         const U stored = half * (compliance(s.after, s.after, soil.law) - compliance(s.before, s.before, soil.law));
         const U worked = quantized(volume * (contract(mean, dt * s.D) + diffused - stored), magic);
         tally.energy.plastic += select(mine, worked, zero);
-        if constexpr (M::diffusive) tally.energy.stabilising -= select(mine, quantized(volume * diffused, magic), zero);
+        if (M::diffusive || (Below::shifting() && in.shifted))
+            tally.energy.stabilising -= select(mine, quantized(volume * diffused, magic), zero);
         if (walled) {
             const U taken = quantized(volume * contract(mean, dt * symmetric_part(s.at_walls)), magic);
             tally.energy.wall -= select(mine, taken, zero);

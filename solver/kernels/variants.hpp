@@ -6,19 +6,20 @@
 
 namespace kuzure {
 
-template <class Kernel> using Everything = Model<Kernel, Viscosity, ArtificialStress, StressDiffusion, GradientCorrection>;
+template <class Kernel> using Everything = Model<Kernel, Viscosity, ArtificialStress, StressDiffusion, GradientCorrection, Shifting>;
 
 using Variants = std::tuple<Model<CubicSpline, NoViscosity>, Model<CubicSpline, LinearViscosity>, Model<WendlandC2, LinearViscosity>,
                             Model<CubicSpline, Viscosity, ArtificialStress>, Model<WendlandC2, Viscosity, ArtificialStress>,
                             Model<CubicSpline, LinearViscosity, NoArtificialStress, StressDiffusion>,
                             Model<WendlandC2, LinearViscosity, NoArtificialStress, StressDiffusion>,
                             Model<WendlandC2, LinearViscosity, NoArtificialStress, NoStressDiffusion, GradientCorrection>,
+                            Model<WendlandC2, LinearViscosity, NoArtificialStress, NoStressDiffusion, NoCorrection, Shifting>,
                             Everything<CubicSpline>, Everything<WendlandC2>, Everything<WendlandC4>>;
 
 /// Bui's leap-frog is compiled for the paper's dry collapse and for everything.
-inline constexpr bool has_leap_frog(int variant) { return variant == 1 || variant >= 8; }
+inline constexpr bool has_leap_frog(int variant) { return variant == 1 || variant >= 9; }
 
-inline constexpr int KUZURE_VARIANTS = 11; // read by CMakeLists.txt and Makefile.knl
+inline constexpr int KUZURE_VARIANTS = 12; // read by CMakeLists.txt and Makefile.knl
 static_assert(std::tuple_size_v<Variants> == KUZURE_VARIANTS);
 
 } // namespace kuzure

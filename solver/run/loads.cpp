@@ -274,6 +274,7 @@ void hold_plates(const Team& team, const Scene& scene, std::span<const Material>
             return quantized(-mass * half_next * dot(unstored[i] + damped, coming), magic);
         };
         const double without = booked(v[i] + half_next * a[i]);
+        if (p.has(field::shift)) p[field::shift].set(i, Vector{}); // a plate's soil goes where the plate goes
         a.set(i, a[i] + change), v.set(i, v[i] + (0.5 * in.dt) * change);
         const Vector coming = v[i] + half_next * a[i];
         result.later.loads += booked(coming) - without;

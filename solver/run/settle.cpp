@@ -33,7 +33,7 @@ Scene settling_scene(const Scene& scene, double end, bool held)
         if (std::holds_alternative<scene::Ground>(wall.shape)) wall.surface = scene::Surface::Rough;
     s.effects.damping = scene::Damping{1, std::numeric_limits<double>::infinity()};
     s.time.end = end, s.time.retry = false;
-    s.accuracy.sleep_below = 0;
+    s.accuracy.sleep_below = 0, s.accuracy.shifting = 0;
     return s;
 }
 

@@ -13,7 +13,9 @@ double column_bytes(const Scene& scene, const Filling& filling)
         const auto is = [](auto... f) { return (std::is_same_v<F, std::remove_const_t<decltype(f)>> || ...); };
         if (is(field::half_velocity, field::half_density, field::half_stress)) return leap_frog;
         if (is(field::acceleration)) return !leap_frog;
-        if (is(field::stress_rate)) return !leap_frog && scene.effects.stress_diffusion.has_value();
+        const bool shifts = !leap_frog && scene.accuracy.shifting > 0;
+        if (is(field::stress_rate)) return shifts || (!leap_frog && scene.effects.stress_diffusion.has_value());
+        if (is(field::shift, field::shift_acceleration)) return shifts;
         if (is(field::wall_slip, field::wall_pressure, field::wall_friction)) return !leap_frog && coulomb;
         if (is(field::wall_force)) return !leap_frog && std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); });
         if (is(field::load, field::load_push)) return !scene.loads.empty();

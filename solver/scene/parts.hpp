@@ -187,6 +187,7 @@ struct Interactions {
     Precision precision;
     Correction correction;
     Scheme scheme = Scheme::Staggered;
+    double shifting = 0; // constant of the shifting of particles; 0: none
 };
 
 } // namespace kuzure::scene

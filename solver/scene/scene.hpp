@@ -14,6 +14,7 @@ struct Accuracy {
     Scheme scheme = Scheme::Staggered;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;
+    double shifting = 0;    // constant C of the shifting of particles in plastic flow; 0: none
     double skin = 0.2;      // list skin in support radii (2 h): cost only, results change in their last bits
     double sleep_below = 0; // m/s; soil that is slower, among soil that is slower, sleeps; 0: never
     bool operator==(const Accuracy&) const = default;
@@ -195,8 +196,8 @@ struct Scene {
     }
     scene::Interactions interactions() const
     {
-        return {dimensions,      space.spacing,      smoothing_length(),  effects,
-                accuracy.kernel, accuracy.precision, accuracy.correction, accuracy.scheme};
+        return {dimensions,         space.spacing,       smoothing_length(), effects,          accuracy.kernel,
+                accuracy.precision, accuracy.correction, accuracy.scheme,    accuracy.shifting};
     }
     bool operator==(const Scene&) const = default;
 };

@@ -559,6 +559,11 @@ CASES = {
         eff("pore_pressure = { table = [0.0, 4.0] }"),
         r":21: effects\.pore_pressure\.table: expected an array of corners \[x, z\] in m, found 0 as a corner",
     ),
+    "shifting_in_one_pass": (
+        acc('scheme = "leap-frog"\nshifting = 2.0'),
+        r'accuracy\.shifting: expected 0, found 2: the leap-frog scheme shifts no particles\. Remedy: accuracy\.scheme = "staggered"',
+    ),
+    "shifting_beyond_range": (acc("shifting = 7.0"), r':22: accuracy\.shifting: expected .* 5.*, found 7'),
     "correction_is_true": (acc("correction = true"), r':22: accuracy\.correction: expected one of "none", "gradient", found true'),
     "correction_misspelt": (
         acc('correction = "gradients"'),

@@ -24,7 +24,7 @@ struct Attraction {
     template <class U> KUZURE_INLINE Vec3<U> force(const Sums<U>& sums) const { return U(p) * sums.pull; }
 };
 using Plain = Model<CubicSpline, LinearViscosity>;
-using Attracting = Model<CubicSpline, LinearViscosity, NoArtificialStress, NoStressDiffusion, NoCorrection, Attraction>;
+using Attracting = Model<CubicSpline, LinearViscosity, NoArtificialStress, NoStressDiffusion, NoCorrection, NoShifting, Attraction>;
 
 struct Result {
     std::vector<Vector> a;

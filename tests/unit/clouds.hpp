@@ -25,6 +25,7 @@ template <int I> Scene scene_of(int dimensions, scene::Scheme scheme)
     if (M::tensile) s.effects.artificial_stress = scene::ArtificialStress{0.5, 2.55};
     if (M::diffusive) s.effects.stress_diffusion = scene::StressDiffusion{0.1};
     if (M::corrected) s.accuracy.correction = scene::Correction::Gradient;
+    if (M::shifts && scheme == scene::Scheme::Staggered) s.accuracy.shifting = 1.5;
     return s;
 }
 /// True if the scene gets this very model.
@@ -33,6 +34,8 @@ template <int I> bool first_to_cover(const Scene& s)
     return [&]<int... J>(std::integer_sequence<int, J...>) { return !(std::tuple_element_t<J, Variants>::covers(s.interactions()) || ...); }
     (std::make_integer_sequence<int, I>{}) && std::tuple_element_t<I, Variants>::covers(s.interactions());
 }
+/// A model that shifts particles and has not everything else.
+template <int I> inline constexpr bool lean_shifting = std::tuple_element_t<I, Variants>::shifts && !has_leap_frog(I);
 /// Throws Broken where a compiled model gets no scene here.
 inline std::vector<Scene> scenes(scene::Scheme scheme)
 {
@@ -43,8 +46,15 @@ inline std::vector<Scene> scenes(scene::Scheme scheme)
             ensure(its_own, "a compiled model that no scene here gets");
             all.push_back(s);
         };
-        (add(scene_of<I>(3, scheme), first_to_cover<I>(scene_of<I>(3, scheme))), ...);
-        (add(scene_of<I>(2, scheme), first_to_cover<I>(scene_of<I>(2, scheme))), ...);
+        const auto add_one = [&]<int V>(std::integral_constant<int, V>, int dimensions, bool shifting) {
+            if (shifting == lean_shifting<V>) add(scene_of<V>(dimensions, scheme), first_to_cover<V>(scene_of<V>(dimensions, scheme)));
+        };
+        const auto add_all = [&](bool shifting) {
+            for (const int dimensions : {3, 2}) (add_one(std::integral_constant<int, I>{}, dimensions, shifting), ...);
+        };
+        add_all(false);
+        // one pass shifts nothing, so what differs by that alone has no scene of its own there
+        if (scheme == scene::Scheme::Staggered) add_all(true);
     }
     (std::make_integer_sequence<int, KUZURE_VARIANTS>{});
     return all;

@@ -56,6 +56,8 @@ struct State {
     double rate, slip, pressure;      // Pa/s, m, m/s^2
     double push;                      // N, of a load; 0: no loads
     std::vector<std::uint8_t> walled; // by id: slip and pressure are kept of particles at walls alone
+    double shift = 0;                 // m/s
+    bool flat = false;                // 2-D
     void operator()(Particles& p) const
     {
         if (push != 0) p.require(field::load, field::load_push);
@@ -75,6 +77,12 @@ struct State {
                 p[field::wall_friction].set(i, most);
             }
             if (p.has(field::opened_volume)) p[field::opened_volume].set(i, i % 4 ? 0 : 1e-5 * std::fabs(u()));
+            if (p.has(field::shift)) {
+                std::mt19937_64 others(std::uint64_t(p[field::id][i]) + 71);
+                const auto w = [&] { return std::uniform_real_distribution<double>(-1, 1)(others); };
+                p[field::shift].set(i, shift * Vector{w(), flat ? 0 : w(), w()});
+                p[field::shift_acceleration].set(i, Vector{w(), flat ? 0 : w(), w()});
+            }
             if (push == 0) continue;
             p[field::load].set(i, std::int32_t(p[field::id][i] % 3)), p[field::load_push].set(i, push * Vector{u(), u(), u()});
         }
@@ -92,12 +100,16 @@ struct Steps {
     double dt, next; // s
 };
 double sound_of(const Cloud& c) { return std::ranges::max(c.soils, {}, &Material::c_p).c_p; }
-/// A step in which the fastest particle goes a tenth of h, if P-waves go no further than two.
-Steps steps(const Cloud& c)
+double fastest_of(const Cloud& c)
 {
     double fastest = 0;
     for (Index i = 0; i < c.particles.size(); ++i) fastest = std::max(fastest, length(std::as_const(c.particles)[field::velocity][i]));
-    const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest, 2 / sound_of(c));
+    return fastest;
+}
+/// A step in which the fastest particle goes a tenth of h, if P-waves go no further than two.
+Steps steps(const Cloud& c)
+{
+    const double dt = c.scene.smoothing_length() * std::min(0.1 / fastest_of(c), 2 / sound_of(c));
     return {dt, 0.7 * dt};
 }
 /// As much as the stress of the cloud pushes one particle.
@@ -112,9 +124,13 @@ State state_of(const Cloud& c)
     const auto& p = c.particles;
     const double support2 = c.scene.support() * c.scene.support();
     // A model may hold more terms than its scene asks for: without diffusion there is no rate of it.
-    State state{c.scene.effects.stress_diffusion ? 1e3 / steps(c).dt : 0, 1e-5 * c.scene.space.spacing,
-                0.1 * sound_of(c) * sound_of(c) / c.scene.smoothing_length(), c.scene.loads.empty() ? 0 : push_of(c),
-                std::vector<std::uint8_t>(std::size_t(p.size()), 0)};
+    State state{c.scene.effects.stress_diffusion || c.scene.accuracy.shifting > 0 ? 1e3 / steps(c).dt : 0,
+                1e-5 * c.scene.space.spacing,
+                0.1 * sound_of(c) * sound_of(c) / c.scene.smoothing_length(),
+                c.scene.loads.empty() ? 0 : push_of(c),
+                std::vector<std::uint8_t>(std::size_t(p.size()), 0),
+                0.2 * fastest_of(c),
+                c.scene.dimensions == 2};
     for (Index i = 0; i < p.size(); ++i)
         for (const auto& w : c.walls)
             for (std::size_t k = 0; k < w.x.size(); ++k) {
@@ -132,7 +148,8 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
 {
     const Scene& s = other ? *other : c.scene;
     Particles p = c.particles;
-    p.require(field::acceleration, field::stress_rate, field::wall_slip, field::wall_pressure, field::wall_friction, field::opened_volume);
+    p.require(field::acceleration, field::stress_rate, field::wall_slip, field::wall_pressure, field::wall_friction, field::opened_volume,
+              field::shift, field::shift_acceleration);
     state_of(c)(p);
     const bool coulomb = std::ranges::any_of(c.scene.walls, [](const scene::Wall& w) { return w.surface == scene::Surface::Coulomb; });
     std::vector<Vector> x, v;
@@ -144,13 +161,14 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         x.push_back(p[field::position][i]), v.push_back(p[field::velocity][i]), density.push_back(p[field::density][i]);
         stress.push_back(p[field::stress][i]), soil.push_back(p[field::soil][i]);
         book::Kept k{{},
-                     s.effects.stress_diffusion ? p[field::stress_rate][i] : Stress{},
+                     s.effects.stress_diffusion || s.accuracy.shifting > 0 ? p[field::stress_rate][i] : Stress{},
                      {},
                      0,
                      0,
                      p[field::plastic_strain][i],
                      p[field::opened_volume][i]};
         if (coulomb) k.slip = p[field::wall_slip][i], k.pressed = p[field::wall_pressure][i], k.friction = p[field::wall_friction][i];
+        if (s.accuracy.shifting > 0) k.shift = p[field::shift][i], k.shift_acceleration = p[field::shift_acceleration][i];
         if (const int l = s.loads.empty() ? -1 : p[field::load][i] - 1; l >= 0) {
             const scene::Load& load = s.loads[std::size_t(l)];
             if (load.follow) k.pressure = unit_pressure(s) * load.factor * *load.pressure;
@@ -179,10 +197,10 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
     Read read;
     for (std::size_t i = 0; i < x.size(); ++i) {
         const auto particle = book::particle(ground_soil, i, setting);
-        read.strain.push_back(book::strain_of(i, ground_soil, kept[i], points, setting, planted.at_end_of_step ? 0 : dt));
+        read.strain.push_back(book::strain_of(i, ground_soil, kept, points, setting, planted.at_end_of_step ? 0 : dt));
         read.strained.push_back(book::strained(particle, c.soils[std::size_t(soil[i])], kept[i], read.strain.back(), setting, dt));
         book::Kept forced = kept[i];
-        const auto at_start = book::strain_of(i, ground_soil, kept[i], points, setting, 0);
+        const auto at_start = book::strain_of(i, ground_soil, kept, points, setting, 0);
         forced.acceleration = at_start.viscous, forced.friction = at_start.friction;
         read.forced.push_back(book::force_on(i, ground_soil, forced, points, setting, dt, next));
         ++read.contacts[int(read.forced.back().contact)], ++read.rubs[int(read.forced.back().rubs)];
@@ -197,13 +215,14 @@ double norm(const Stress& s) { return std::sqrt(contract(s, s)); }
 /// Largest differences, each over what its sums may lose to rounding: the largest value, or what the largest stress or speed makes of
 /// one neighbour.
 struct Difference {
-    double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0;                       // strain
+    double L = 0, stress = 0, density = 0, plastic = 0, viscous = 0, shift = 0;            // strain
     double acceleration = 0, velocity = 0, rate = 0, slip = 0, pressure = 0, friction = 0; // force
     double strain_energy[3] = {}, moved[4] = {}, before[6] = {}, later[6] = {};            // energies; moved: by viscosity at moving walls
     std::int64_t pairs = 0;
     double largest() const
     {
-        double most = std::max({L, stress, density, plastic, viscous, acceleration, velocity, pressure, friction}); // but for rate and slip
+        double most =
+            std::max({L, stress, density, plastic, viscous, shift, acceleration, velocity, pressure, friction}); // but for rate and slip
         for (const auto e : strain_energy) most = std::max(most, e);
         for (const auto e : moved) most = std::max(most, e);
         for (int k = 0; k < 6; ++k) most = std::max({most, before[k], later[k]});
@@ -213,8 +232,8 @@ struct Difference {
 std::ostream& operator<<(std::ostream& to, const Difference& d)
 {
     to << "L " << d.L << " stress " << d.stress << " density " << d.density << " plastic strain " << d.plastic << " viscous " << d.viscous
-       << " a " << d.acceleration << " v " << d.velocity << " stress rate " << d.rate << " slip " << d.slip << " pressure " << d.pressure
-       << " friction " << d.friction << " pairs " << d.pairs << " energies of strain";
+       << " shift " << d.shift << " a " << d.acceleration << " v " << d.velocity << " stress rate " << d.rate << " slip " << d.slip
+       << " pressure " << d.pressure << " friction " << d.friction << " pairs " << d.pairs << " energies of strain";
     for (const auto e : d.strain_energy) to << " " << e;
     to << " of moving walls";
     for (const auto e : d.moved) to << " " << e;
@@ -248,13 +267,14 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
     const auto &s = pass.strain.after, &f = pass.force.after;
     const auto [dt, next] = steps(c);
     const double h = c.scene.smoothing_length(), volume = c.scene.particle_volume();
-    double stress = 0, speed = 0, density = 0, a = 0, L = 0, rate = 0, stiff = 0;
+    double stress = 0, speed = 0, density = 0, a = 0, L = 0, rate = 0, stiff = 0, shift = 1e-300;
     for (const auto& m : c.soils) stiff = std::max(stiff, m.bulk + m.shear);
     for (Index i = 0; i < p.size(); ++i) {
         stress = std::max(stress, norm(p[field::stress][i])), speed = std::max(speed, length(p[field::velocity][i]));
         density = std::max(density, p[field::density][i]);
         a = std::max(a, length(read.forced[i].acceleration)), L = std::max(L, norm(read.strain[i].L));
         rate = std::max(rate, norm(read.forced[i].stress_rate));
+        shift = std::max(shift, length(read.strained[i].shift));
     }
     for (const auto& p : poses_of(c.scene)) speed = std::max(speed, length(p.after.shift - p.before.shift) / wall_dt);
     const double of_a = std::max(a, stress / (density * h)), of_L = std::max(L, speed / h), of_stress = std::max(stress, dt * stiff * of_L);
@@ -271,6 +291,10 @@ Difference difference(const Cloud& c, const Passed& pass, const Read& read)
         note(d.density, std::fabs(s[field::density][i] - strained.density), density);
         note(d.plastic, std::fabs(s[field::plastic_strain][i] - strained.plastic_strain), std::max(0.01, of_L * dt));
         note(d.viscous, length(s[field::acceleration][i] - strain.viscous), of_a);
+        if (s.has(field::shift)) {
+            note(d.shift, length(s[field::shift][i] - strained.shift), std::max(shift, 8 * 0.2 * c.scene.accuracy.shifting * h * of_L));
+            note(d.shift, length(s[field::shift_acceleration][i] - strained.shift_acceleration), of_L * 0.2 * fastest_of(c));
+        }
         note(d.acceleration, length(f[field::acceleration][i] - forced.acceleration), of_a);
         note(d.velocity, length(f[field::velocity][i] - forced.velocity), speed + dt * of_a);
         if (f.has(field::stress_rate)) note(d.rate, norm(f[field::stress_rate][i] - forced.stress_rate), std::max(rate, 1e-300));
@@ -592,5 +616,6 @@ TEST(StaggeredByTheBook, NoticesAPlantedFaultInEveryTerm)
             EXPECT_GT(std::max(off.largest(), off.rate), 10 * rough) << fault << ", " << dimensions << "-D";
         };
         plant_faults(planted);
+        planted("shifting", [](Scene& m) { m.accuracy.shifting *= 1.01; });
     }
 }
