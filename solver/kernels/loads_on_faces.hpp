@@ -1,7 +1,6 @@
 #pragma once
 // Loads in the force stage: pressures that follow their face, and shares of a force that was measured once.
-#include "solver/kernels/pair_model.hpp"
-#include "solver/pairs/cluster.hpp"
+#include "solver/kernels/cluster_pass.hpp"
 
 namespace kuzure {
 

@@ -159,9 +159,10 @@ private:
                        : "accuracy.correction = \"none\"");
         const double shifting = scene_.accuracy.shifting;
         note("shifting", shifting > 0,
-             shifting > 0 ? text("constant {:.3g}: soil that shears plastically keeps an even spacing, stress and velocity are carried along",
-                                 shifting)
-                          : "accuracy.shifting = 0");
+             shifting > 0
+                 ? text("constant {:.3g}: soil that shears plastically keeps an even spacing, stress and velocity are carried along",
+                        shifting)
+                 : "accuracy.shifting = 0");
         const double slow = scene_.accuracy.sleep_below;
         note("sleep", slow > 0,
              slow > 0 ? text("soil slower than {:.3g} m/s among soil as slow keeps its state, looked at every {} steps", slow,
