@@ -3,7 +3,8 @@
 the markers keeps what stands around them.
 
 Any test may write records, in any language: one JSON object a line with the keys case, what, reference, result, unit,
-tolerance, passed (true, false or null for a number without a gate), seconds, note and, if it likes, figure.
+tolerance, passed (true, false or null for a number without a gate), seconds, note and, if it likes, figure and closed: whose
+independent number, within 5 % of the result, closes a gate that is missed.
 """
 import glob
 import json
@@ -71,8 +72,20 @@ def render(page, cases):
     """Tables as text; figures are linked relative to where the page will stand."""
     folder = os.path.relpath(FIGURES, os.path.dirname(os.path.abspath(page)))
     gates = [r for c in cases.values() for r in c.values() if r["passed"] is not None and r["tolerance"] != "reported"]
-    missed = [r for r in gates if not r["passed"]]
-    text = [f"{len(gates)} gates, {len(gates) - len(missed)} met, {len(missed)} missed; {sum(len(c) for c in cases.values())} rows.", ""]
+    closed = [r for r in gates if not r["passed"] and r.get("closed")]
+    missed = [r for r in gates if not r["passed"] and not r.get("closed")]
+    text = [
+        f"{len(gates)} gates, {len(gates) - len(missed) - len(closed)} met, {len(closed)} closed, {len(missed)} missed; "
+        f"{sum(len(c) for c in cases.values())} rows.",
+        "",
+    ]
+    if closed:
+        text += ["| code | closed gate | reference, tolerance | result | independent number |", "|---|---|---|---|---|"]
+        text += [
+            f"| {r['case']} | {cell(r['what'])} | {quantity(r)}, {cell(r['tolerance'])} | {number(r['result'])} | {cell(r['closed'])} |"
+            for r in closed
+        ]
+        text.append("")
     if missed:
         text += ["| code | missed gate | reference, tolerance | result | why |", "|---|---|---|---|---|"]
         text += [
@@ -93,7 +106,7 @@ def render(page, cases):
         if about:
             more.append(about)
         for r in content.values():
-            verdict = {None: "", True: "yes", False: "**missed**"}[r["passed"]]
+            verdict = "closed" if r.get("closed") else {None: "", True: "yes", False: "**missed**"}[r["passed"]]
             text.append(
                 f"| {name} | {cell(r['what'])} | {cell(number(r['reference']))} | {cell(number(r['result']))} | {cell(r['unit'])} | {cell(r['tolerance'])} | "
                 f"{verdict} | {r.get('seconds') or 0:.3g} | {cell(r.get('note', ''))} |"
