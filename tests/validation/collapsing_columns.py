@@ -6,12 +6,13 @@ rough floor, K0 start, released at once. Constant friction fits collapses with t
 beads), not with the one at which they stop (22 deg), Rousseau et al. 2023: the cone "shear", 3 alpha = tan 27.4 deg = 0.518, in both
 geometries. The soils of the older criteria, the stop angle of 22.2 deg in the plane-strain cone (3 alpha = 0.369) and in the
 compression cone (0.499), stand beside, against the independent code. Plane strain: half of a column that spreads to both sides
-(smooth wall at x = 0), 40 spacings across L0. Axisymmetric: a whole cylinder, 10 spacings across its radius. Viscosity alpha 0.1, and
+(smooth wall at x = 0), 50 spacings across L0. Axisymmetric: a whole cylinder, 10 spacings across its radius. Viscosity alpha 0.1, and
 of the solver what a scene gets that asks for nothing else.
 
 The front is where the deposit is so high by volume (2-D: columns of four spacings; axisymmetric: rings of two), which single thrown
-grains do not move: 0.05 L0 in plane strain, 0.02 L0 in the axisymmetric case, where rings hold many particles and one spacing would be
-a fifth of the lowest column. history.csv's fronts, the outermost column with any grain, stand in the notes.
+grains do not move: 0.05 L0 in plane strain, two and a half spacings; 0.02 L0 in the axisymmetric case, where rings hold many particles.
+One spacing, the older level, was a tenth and a fifth of the lowest column. history.csv's fronts, the outermost column with any grain,
+stand in the notes.
 """
 import sys
 
@@ -51,8 +52,8 @@ HEIGHT = {
     },
 }
 BREAK = {"plane": 2.5, "axisymmetric": 1.7}  # between the two power laws, as published
-ACROSS = {"plane": 40, "axisymmetric": 10}
-LEVEL = {"plane": 0.05 * L0, "axisymmetric": 0.02 * L0}  # of the front, m
+ACROSS = {"plane": 50, "axisymmetric": 10}
+LEVEL = {"plane": L0 / 20, "axisymmetric": L0 / 50}  # of the front, m
 # The exponent of the run-out and its tolerance. Above the break in plane strain: 0.9 in channels so wide that side walls do not count,
 # as there are none here; 2/3 is that of narrow slots, whose walls hold the grains back (Balmforth & Kerswell 2005).
 EXPONENT = {
@@ -62,10 +63,15 @@ EXPONENT = {
     ("axisymmetric", "above"): (0.5, 0.15),
 }
 # An independent code: explicit MPM (APIC, quadratic B-splines; axisymmetric with a hoop stress), the same hypoelastic Drucker-Prager law
-# without viscosity and without memory of opened volume, fronts by volume at the same levels. Cells across L0: 40 to a = 1, then 20; four
-# particles a cell. It is nothing of this project's.
+# without viscosity and without memory of opened volume, a program of its own. Cells across L0: 40 to a = 1, then 20; four particles a
+# cell. Fronts by volume in columns and rings of 20 mm, at the levels of LEVEL, and of one spacing for the stop angle.
 MPM = "independent explicit MPM (APIC, quadratic B-splines), the same law"
-MPM_RUNOUT = {("plane", "start"): {}, ("plane", "stop"): {}, ("axisymmetric", "start"): {}, ("axisymmetric", "stop"): {}}
+MPM_RUNOUT = {
+    ("plane", "start"): {0.5: 0.480, 1: 1.339, 2: 2.835, 3: 4.517, 5: 7.278, 10: 13.11},
+    ("plane", "stop"): {0.5: 0.730, 1: 1.995, 2: 4.422, 5: 9.869},
+    ("axisymmetric", "start"): {0.5: 0.517, 1: 1.207, 2: 2.116, 5: 4.850},
+    ("axisymmetric", "stop"): {0.5: 0.310, 1: 0.801, 2: 1.577, 5: 3.011},
+}
 
 
 def scene(kind, a, across=None, stop=False, **changes):
@@ -160,8 +166,9 @@ def record_gate_at_2(case, m):
 
 
 def control(case):
-    """mu = tan(phi) = 2: the soil hardly spreads, and the a = 2 gate has to see it."""
-    m = measure(run(scene("plane", 2, **{"soil.friction_angle": 63.43}), "V-EXP-3", "plane-2-mu2"), "plane", 2)
+    """tan(phi) = 2, in the plane-strain cone: the soil hardly spreads, and the a = 2 gate has to see it."""
+    steep = {"soil.friction_angle": 63.43, "soil.cone": "plane strain"}
+    m = measure(run(scene("plane", 2, **steep), "V-EXP-3", "plane-2-mu2"), "plane", 2)
     case.control(
         "plane, a = 2, mu = 2: the a = 2 gate",
         not gate_at_2(m),
@@ -173,34 +180,41 @@ def control(case):
 
 
 VARIANTS = [
-    ("20 spacings across L0", "20", 20, {}),
-    ("viscosity alpha 0.05", "alpha0.05", 40, {"effects.viscosity": {"alpha": 0.05, "beta": 0.0}}),
-    ("viscosity alpha 0.3", "alpha0.3", 40, {"effects.viscosity": {"alpha": 0.3, "beta": 0.0}}),
-    ("E x 4", "E4", 40, {"soil.young": 4 * 1.98e6}),
-    ("cubic spline, h 1.2", "cubic", 40, {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
+    ("20 spacings across L0", "20", {}),
+    ("viscosity alpha 0.05", "20-alpha0.05", {"effects.viscosity": {"alpha": 0.05, "beta": 0.0}}),
+    ("viscosity alpha 0.3", "20-alpha0.3", {"effects.viscosity": {"alpha": 0.3, "beta": 0.0}}),
+    ("E x 4", "20-E4", {"soil.young": 4 * 1.98e6}),
+    ("cubic spline, h 1.2", "20-cubic", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
 ]
 
 
 def sensitivity(case, base):
-    for label, name, across, changes in VARIANTS:
-        m = measure(run(scene("plane", 2, across, **changes), "V-EXP-3", "plane-2-" + name), "plane", 2, across)
+    for label, name, changes in VARIANTS:
+        m = measure(run(scene("plane", 2, 20, **changes), "V-EXP-3", "plane-2-" + name), "plane", 2, 20)
         case.record(
-            f"sensitivity, plane, a = 2: {label}: run-out",
+            f"sensitivity, plane, a = 2: 20 spacings, {label}: run-out" if changes else f"sensitivity, plane, a = 2: {label}: run-out",
             round(base["runout"], 3),
             m["runout"],
             "L0",
             seconds=m["seconds"],
             note=f"height {m['height']:.2f} (base {base['height']:.2f})",
         )
-    # The higher the front is taken, the more it cuts off, and of thin deposits most: how much of the exponent is that?
-    fine = [measure(run(scene("plane", a, 50), "V-EXP-3", f"plane-{a:g}-50"), "plane", a, 50, 0.02 * L0) for a in (0.5, 1, 2)]
-    case.record(
-        "sensitivity, plane: exponent below the break with 50 spacings across L0 and the front at 0.02 L0",
-        1.0,
-        exponent({m["a"]: m["runout"] for m in fine}),
-        seconds=sum(m["seconds"] for m in fine),
-        note="run-out " + ", ".join(f"{m['runout']:.2f} at a = {m['a']:g}" for m in fine),
-    )
+    # The higher the front is taken, the more it cuts off, and of thin deposits most.
+    for across, level in ((20, 0.05), (40, 0.05), (50, 0.02)):
+        name = "" if across == ACROSS["plane"] else f"-{across}"
+        fine = [
+            measure(run(scene("plane", a, across), "V-EXP-3", f"plane-{a:g}{name}", minutes=40), "plane", a, across, level * L0)
+            for a in ASPECTS["plane"]
+        ]
+        for side in ("below", "above"):
+            part = part_of({m["a"]: m["runout"] for m in fine}, "plane", side)
+            case.record(
+                f"sensitivity, plane: exponent {side} the break with {across} spacings across L0 and the front at {level} L0",
+                EXPONENT["plane", side][0],
+                exponent(part),
+                seconds=sum(m["seconds"] for m in fine if m["a"] in part),
+                note="run-out " + ", ".join(f"{r:.2f} at a = {a:g}" for a, r in part.items()),
+            )
 
 
 def record_exponents(case, kind, rows):
@@ -259,12 +273,13 @@ def aspect_series(case, kind, aspects):
 
 
 def with_the_stop_angle(case, kind):
-    """The soils of the older criteria, with the front at the older level: what a frictional continuum of that mu gives by another code."""
-    level, reference = {"plane": 0.05, "axisymmetric": 0.1}[kind] * L0, MPM_RUNOUT[kind, "stop"]
+    """The soils and spacings of the older criteria, with the front one spacing high: what a frictional continuum of that mu gives by another code."""
+    across = {"plane": 20, "axisymmetric": 10}[kind]
+    level, reference = L0 / across, MPM_RUNOUT[kind, "stop"]
     mu = {"plane": 0.369, "axisymmetric": 0.499}[kind]
     found = {}
     for a, by_mpm in reference.items():
-        m = measure(run(scene(kind, a, stop=True), "V-EXP-3", f"{kind}-{a:g}-stop", minutes=40), kind, a, level=level)
+        m = measure(run(scene(kind, a, across, stop=True), "V-EXP-3", f"{kind}-{a:g}-stop", minutes=40), kind, a, across, level)
         found[a] = m["runout"]
         case.record(
             f"{kind}, a = {a:g}, stop angle, mu = 3 alpha = {mu}: run-out",

@@ -148,10 +148,18 @@ def surface(x, z, dx, at, half_width=None):
 
 
 def thickness(x, dx, at, width):
-    """Height by volume: spacing^2 for each particle of a column `width` wide. Unlike `surface` it does not see single thrown grains."""
+    """Height by volume of columns `width` wide: each particle counts with the part of its square that lies in the column, so that no count
+    jumps as a column moves. Unlike `surface` it does not see single thrown grains."""
     xs = np.sort(x)
-    low, high = np.searchsorted(xs, np.asarray(at) - 0.5 * width), np.searchsorted(xs, np.asarray(at) + 0.5 * width)
-    return (high - low) * dx * dx / width
+    total = np.concatenate([[0.0], np.cumsum(xs)])
+
+    def left_of(q):
+        """Area of all squares left of q, over dx^2."""
+        low, high = np.searchsorted(xs, q - 0.5 * dx), np.searchsorted(xs, q + 0.5 * dx)
+        return low + ((high - low) * (q + 0.5 * dx) - (total[high] - total[low])) / dx
+
+    at = np.asarray(at)
+    return (left_of(at + 0.5 * width) - left_of(at - 0.5 * width)) * dx * dx / width
 
 
 def last_crossing(x, y, level):
