@@ -181,10 +181,10 @@ def control(case):
 
 VARIANTS = [
     ("20 spacings across L0", "20", {}),
-    ("viscosity alpha 0.05", "20-alpha0.05", {"effects.viscosity": {"alpha": 0.05, "beta": 0.0}}),
-    ("viscosity alpha 0.3", "20-alpha0.3", {"effects.viscosity": {"alpha": 0.3, "beta": 0.0}}),
-    ("E x 4", "20-E4", {"soil.young": 4 * 1.98e6}),
-    ("cubic spline, h 1.2", "20-cubic", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
+    ("20 spacings, viscosity alpha 0.05", "20-alpha0.05", {"effects.viscosity": {"alpha": 0.05, "beta": 0.0}}),
+    ("20 spacings, viscosity alpha 0.3", "20-alpha0.3", {"effects.viscosity": {"alpha": 0.3, "beta": 0.0}}),
+    ("20 spacings, E x 4", "20-E4", {"soil.young": 4 * 1.98e6}),
+    ("20 spacings, cubic spline, h 1.2", "20-cubic", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
 ]
 
 
@@ -192,13 +192,15 @@ def sensitivity(case, base):
     for label, name, changes in VARIANTS:
         m = measure(run(scene("plane", 2, 20, **changes), "V-EXP-3", "plane-2-" + name), "plane", 2, 20)
         case.record(
-            f"sensitivity, plane, a = 2: 20 spacings, {label}: run-out" if changes else f"sensitivity, plane, a = 2: {label}: run-out",
+            f"sensitivity, plane, a = 2: {label}: run-out",
             round(base["runout"], 3),
             m["runout"],
             "L0",
             seconds=m["seconds"],
             note=f"height {m['height']:.2f} (base {base['height']:.2f})",
         )
+        if not changes:
+            base = m  # of the changes below, which are made to it
     # The higher the front is taken, the more it cuts off, and of thin deposits most.
     for across, level in ((20, 0.05), (40, 0.05), (50, 0.02)):
         name = "" if across == ACROSS["plane"] else f"-{across}"

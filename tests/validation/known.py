@@ -2,4 +2,26 @@
 another one is missed, or when one of these is met after all and should leave this list. Keys: the case and what was measured.
 Cases written in C++ give their reasons themselves."""
 
-MISSES = {}
+CHECKERBOARD = (
+    "zero-energy mode: neighbours in a row move up and down in turn, without plastic strain, and the motion grows exponentially; alpha = 0.5 slows it. "
+    "It is of the kernel and not of the time step; hourglass control would be the cure. Cubic spline with h 1.2 and Wendland C2 do not show it"
+)
+
+MISSES = {
+    (
+        "V-EXP-1",
+        "spacing 2 mm: x where the deposit is 5 mm high, surface by highest bars",
+    ): "by two bars' width: single bars on a toe two or three bars thick; by volume the toe is within 1 mm",
+    (
+        "V-EXP-3",
+        "axisymmetric: exponent of the run-out above the break",
+    ): "two columns only (a = 2 and 5), and a frictional continuum, which has no collisions that dissipate, runs too far as a grows. The independent MPM, "
+    "which throws spray at a = 5, has 0.905, 0.82 with the front at 0.05 L0 (0.75 here) and 0.71 at 0.1 L0 (0.81 here): too far apart to close this",
+    ("V-EXP-4", "stable slope (SRF 1) at rest, cubic spline, h 1.3: displacement after 8 s"): CHECKERBOARD,
+    ("V-EXP-4", "stable slope (SRF 1) at rest, cubic spline, h 1.5: displacement after 8 s"): CHECKERBOARD,
+    (
+        "V-EXP-5",
+        "eps 1.0 instead of 0.5: change of the crest drop",
+    ): "the artificial stress gives work to soil that is stretched and does not take all of it back: eps is not a neutral parameter here (the ledger has it under "
+    "stabilising; artificial-stress-gives-nothing)",
+}

@@ -21,14 +21,14 @@ BEGIN, END = "<!-- measured -->\n", "<!-- end -->"
 ABOUT = {
     "V-EXP-1": """Aluminium bars, 200 x 100 mm, plane strain (Bui et al. 2008, digitised under an MIT licence).
 The surface is measured twice: by volume in columns of four spacings, and by the highest bar.
-The friction of 19.8 deg is that of a shear box, so 3 alpha = tan 19.8 deg (cone "shear"); the older criterion took the plane-strain cone, which is 8 % weaker and leaves the failure line too steep.
+The friction of 19.8 deg is that of a shear box, so 3 alpha = tan 19.8 deg (cone "shear"); the older criterion took the plane-strain cone, which is 8 % weaker.
 The compression cone of the paper (its phi of 19.8 deg acts like 26.2 deg in plane strain) stops visibly short, as predicted: it is a control.
 The toe moves with the artificial viscosity, and with E, which is consistent with a viscosity that goes with the wave speed: E x 4 and alpha x 2 shorten it alike.""",
     "V-EXP-3": """Columns of glass beads, a = H0/L0, released at once on a rough floor, with 3 alpha = tan of the angle at which these beads start to flow, 27.4 deg (Rousseau et al. 2023).
-With the angle at which they stop, 22.2 deg, they run half as far again: both this program and an independent MPM code say so, and the numbers of both are in the rows "stop angle".
+With the angle at which they stop, 22.2 deg, they run nearly half as far again: both this program and an independent MPM code say so, and the numbers of both are in the rows "stop angle".
 The exponents are those of a frictional continuum, in which tall columns run too far (Kumar 2015): neither code has the collisions that dissipate, nor side walls.
 Below the break the linear law holds only while a part of the top stays where it was, up to a = 0.7.
-Fronts are good to about 0.1 L0: of so much they differ between runs that differ in the last bit.""",
+Fronts are good to about 0.1 L0 at 20 spacings: by so much runs differ that differ in the last bit.""",
     "V-EXP-4": """A 2:1 slope by strength reduction, one run for each factor: K0 start, two seconds of critical damping, then free.
 A slope fails when its greatest displacement bends upwards in the first second.
 The chart is of associated flow, and associated flow (psi = phi, the plane-strain cone) meets it.
