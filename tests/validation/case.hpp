@@ -46,6 +46,13 @@ struct SceneText {
                            accuracy);
     }
     Scene scene() const { return io::parse_scene(text(), "verification"); }
+    /// With the kernel and the smoothing length of a scene that asks for none.
+    SceneText with_default_kernel() const
+    {
+        SceneText t = *this;
+        t.h = scene::Space{}.h, t.accuracy.clear();
+        return t;
+    }
 
     double bulk() const { return young / (3 * (1 - 2 * poisson)); }                // Pa
     double shear() const { return young / (2 * (1 + poisson)); }                   // Pa
