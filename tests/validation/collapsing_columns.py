@@ -330,6 +330,10 @@ def draw(case, series):
                 )
                 plots.append(f"'{file}' every ::1 u 1:2 w l lw 1.6 lc rgb '{colour}' t '{name}'")
             plots.append(f"'{curves}' every ::1 u 1:{column} w p pt 7 ps 1.1 lc rgb '{COLOURS[0]}' t 'kuzure'")
+            if laws is RUNOUT[kind]:
+                mpm = MPM_RUNOUT[kind, "start"]
+                file = case.curve(f"mpm-{kind}", a=np.array(list(mpm)), runout=np.array(list(mpm.values())))
+                plots.append(f"'{file}' every ::1 u 1:2 w p pt 6 ps 1.4 lc rgb 'black' t 'independent MPM'")
             panels.append(
                 f"set title '{'plane strain' if kind == 'plane' else 'axisymmetric'}'; set ylabel '{what}'; plot " + ", ".join(plots)
             )

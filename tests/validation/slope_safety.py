@@ -179,7 +179,7 @@ def record_associated(case, swept):
     seconds: soil that slides far with a constant angle of dilation swells without end."""
     for across in (20, 40):
         found, done = factor("plane strain", across, 1.3, 1.45, tag="-associated", associated=True, **{"time.end": SETTLE + 3})
-        swept.append((f"plane strain, psi = phi, H/dx {across}", f"associated-{across}", done))
+        swept.append((f"psi = phi, H/dx {across} (3 s)", f"associated-{across}", done))
         case.within(
             f"factor of safety, psi = phi, cone plane strain, H/dx {across}",
             CHART,
