@@ -268,7 +268,7 @@ class Case:
         }
         with open(self.file, "a") as f:
             f.write(json.dumps(row) + "\n")
-        mark = "closed" if closed else {None: "      ", True: "ok    ", False: "FAIL  "}[row["passed"]]
+        mark = "closed " if closed else {None: "      ", True: "ok    ", False: "FAIL  "}[row["passed"]]
         print(f"{mark}{what}: {result} {unit} (reference {reference}, {tolerance or 'no gate'}) {note} {closed}".rstrip(), flush=True)
         known, good = (self.name, what) in MISSES, row["passed"] or bool(closed)
         if row["passed"] is not None and not good:
