@@ -211,7 +211,7 @@ def main(quick=False, slow=False):
         "%",
         "<= 1 %",
         None if quick else ledger,
-        note=f"{bad['residual']:.3f} % without artificial stress: the ledger has no entry for its work",
+        note=f"{bad['residual']:.3f} % without artificial stress",
         **more,
     )
     case.control(
