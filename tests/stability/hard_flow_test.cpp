@@ -170,7 +170,7 @@ TEST(Flow, CornerWedgeAndThinWall)
     });
     EXPECT_TRUE(
         c.at_most("error of sigma_zz in the corners of a smooth tank", worst, "1", 0.1,
-                  {.note = "7 % on the floor away from the corners; the corner answers for the face nearest to it", .achieved = 0.22}));
+                  {.note = "11 % on the floor away from the corners; the corner answers for the face nearest to it", .achieved = 0.22}));
     c.report("error of sigma_zz on the floor of a smooth tank away from its corners", middle, "1");
     const auto broken = retained(1, 8);
     EXPECT_FALSE(c.control("soil thrown at a wall of 1 layer, four times as fast: depth in it", broken.depth, "dx", "<= 0.5, none outside",
@@ -191,8 +191,10 @@ TEST(Flow, TallColumns)
             fmt::format("a = {}: run-out over the half width", a), r[k].runout, "1",
             fmt::format("Lube 2005 1.9 a^(2/3) = {:.3g}, Lajeunesse 2005 {:.3g}", 1.9 * std::pow(a, 2.0 / 3), 2.3 * std::pow(a, 2.0 / 3)));
     }
-    EXPECT_TRUE(c.near("exponent of the run-out, a = 10 and 20", 2.0 / 3, std::log2(r[1].runout / r[0].runout), "1", 0.2,
-                       {.note = "half width of 5 dx; front of loose grains, constant friction of 24 deg", .achieved = 0.35}));
+    // Without side walls 0.9; 2/3 is that of narrow slots, whose walls hold the grains back (Balmforth & Kerswell 2005).
+    const double exponent = std::log2(r[1].runout / r[0].runout);
+    EXPECT_TRUE(c.near("exponent of the run-out, a = 10 and 20", 0.9, exponent, "1", 0.1 / 0.9));
+    c.report("old criterion, 2/3 +-20 %: exponent of the run-out, a = 10 and 20", exponent, "1", "there are no side walls here");
     const auto bare = tall(10, "", 2.6);
     EXPECT_FALSE(c.control("a = 10, no viscosity, dt c_p/h = 2.6: energy residual", bare.energy, "1", "held, <= 0.02",
                            bare.outcome.held() && bare.lost == 0 && bare.energy <= 0.02));
@@ -224,7 +226,8 @@ TEST(Flow, HeapAtRest)
         const char* name;
         double h;
     };
-    for (const Kernel& k : {Kernel{"cubic spline", 1.2}, Kernel{"cubic spline", 1.3}, Kernel{"wendland c2", 1.5}}) {
+    for (const Kernel& k :
+         {Kernel{"cubic spline", 1.2}, Kernel{"cubic spline", 1.3}, Kernel{"wendland c2", 1.3}, Kernel{"wendland c2", 1.5}}) {
         const auto r = heap(0.04, 1.4, 20, k.name, k.h);
         const std::string name = fmt::format("20 sqrt(H/g), {} h {}: ", k.name, k.h);
         EXPECT_TRUE(c.at_most(name + "drift", r.drift, "dx", 0.1));

@@ -240,7 +240,9 @@ TEST(Steps, TenTurnsOfAStressedDisc)
     const auto corrected = turn(10, "gradient");
     EXPECT_TRUE(corrected.outcome.held());
     EXPECT_TRUE(c.at_most("10 turns, correction: drift of the stress eigenvalues", corrected.stress_drift, "1", 0.01,
-                          {.note = "about 0.5 % of Young's modulus in ten turns, as the radius; cause not found", .achieved = 2}));
+                          {.note = "about 0.5 % of Young's modulus in ten turns, as the radius: the correction is in the velocity "
+                                   "gradient alone, so force and strain are not adjoint",
+                           .achieved = 2}));
     EXPECT_TRUE(c.at_most("10 turns, correction: change of radius", corrected.radius, "1", 0.01));
     const auto plain = turn(2, "none");
     EXPECT_FALSE(c.control_at_most("2 turns, no correction: change of radius", plain.radius, "1", 0.01));
@@ -259,7 +261,7 @@ TEST(Steps, CheckerboardDies)
             EXPECT_TRUE(
                 c.at_most(fmt::format("checkerboard energy left after 20 dx/c_p, {} h {}, alpha = {}", k.name, k.h, alpha),
                           checkerboard(alpha, k.name, k.h), "1", 0.1,
-                          {.note = "the decay rate is proportional to alpha: 0.12 would do", .achieved = alpha < 0.1 ? 0.4 : 0.13}));
+                          {.note = "the decay rate is proportional to alpha: 0.11 would do", .achieved = alpha < 0.1 ? 0.4 : 0.12}));
     EXPECT_TRUE(c.at_most("checkerboard energy left after 20 dx/c_p, cubic spline h 1.2, alpha = 0.2",
                           checkerboard(0.2, "cubic spline", 1.2), "1", 0.1));
     EXPECT_FALSE(c.control_at_most("checkerboard energy left after 20 dx/c_p, alpha = 0", checkerboard(0, "cubic spline", 1.2), "1", 0.1));

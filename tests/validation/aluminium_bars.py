@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """V-EXP-1: collapse of a column of aluminium bars (Bui et al. 2008), 200 x 100 mm, plane strain.
 
-Every parameter is fixed by the published set before any run: rho 2650 kg/m^3, E 0.84 MPa, nu 0.3, c 0, phi 19.8 deg, psi 0,
-rough floor, smooth left wall; of the solver: viscosity alpha 0.1 and what a scene gets that asks for nothing else
-(cubic spline, h 1.3 spacings, Courant number 0.2). The column starts at rest (K0) and is released all at once.
+Every parameter is fixed by the published set: rho 2650 kg/m^3, E 0.84 MPa, nu 0.3, c 0, phi 19.8 deg, psi 0, rough floor, smooth left
+wall; of the solver: viscosity alpha 0.1 and what a scene gets that asks for nothing else. The column starts at rest (K0) and is
+released all at once. The 19.8 deg are those of a shear box, whose shear stress over normal stress on a plane sheared without change of
+volume is 3 alpha in every cone: the cone "shear", 3 alpha = tan 19.8 deg = 0.360. The plane-strain cone of the older criterion
+(0.332) stands beside.
 """
 import sys
 
@@ -50,7 +52,7 @@ def scene(mm, **changes):
     base = {
         "title": f"V-EXP-1: aluminium bars, spacing {mm:g} mm",
         "dimensions": 2,
-        "space": {"spacing": dx, "h": 1.3},
+        "space": {"spacing": dx},
         "time": {"end": 0.8},  # 8 sqrt(H/g): three times the time the collapse takes
         "soil": {
             "bars": {
@@ -60,7 +62,7 @@ def scene(mm, **changes):
                 "cohesion": 0.0,
                 "friction_angle": 19.8,
                 "dilation_angle": 0.0,
-                "cone": "plane strain",
+                "cone": "shear",
             }
         },
         "body": [{"soil": "bars", "box": {"low": [0.0, 0.0, 0.0], "high": [0.2, 0.0, 0.1]}, "stress": "at rest"}],
@@ -69,7 +71,6 @@ def scene(mm, **changes):
             {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 0.12]}},
         ],
         "effects": {"gravity": [0.0, 0.0, -GRAVITY], "viscosity": {"alpha": 0.1, "beta": 0.0}},
-        "accuracy": {"kernel": "cubic spline"},
         "output": {"every": 0.2, "history": 0.004},
     }
     return changed(base, changes)
@@ -134,21 +135,23 @@ def measure(result, mm):
     }
 
 
-def record_gates(case, m, mm, gate=True):
+def record_gates(case, m, mm, gate=True, prefix=""):
     """The gates; at a spacing too coarse for them, or for information, without a verdict."""
-    tag = f"spacing {mm:g} mm: "
+    tag, old = f"{prefix}spacing {mm:g} mm: ", "old criterion: " if prefix else ""
     more = {"seconds": m["seconds"], "figure": "aluminium_bars_profile.png"}
     for surface_by, error, toe, note in (
         ("volume", m["error"], m["toe"], f"99.9 % of the soil within {m['front']:.0f} mm"),
         ("highest bars", m["error_top"], m["toe_top"], "single bars on the toe count in full"),
     ):
-        case.record(tag + f"profile error P_d, surface by {surface_by}", 0.0, error, "%", "<= 5 %", error <= 5.0 if gate else None, **more)
+        case.record(
+            tag + f"profile error P_d, surface by {surface_by}", 0.0, error, "%", old + "<= 5 %", error <= 5.0 if gate else None, **more
+        )
         case.record(
             tag + f"x where the deposit is 5 mm high, surface by {surface_by}",
             TOE,
             toe,
             "mm",
-            "+-5 %",
+            old + "+-5 %",
             abs(toe - TOE) <= 0.05 * TOE if gate else None,
             note=note,
             **more,
@@ -158,11 +161,13 @@ def record_gates(case, m, mm, gate=True):
         0.0,
         m["line"],
         "mm",
-        "<= 5 mm",
+        old + "<= 5 mm",
         m["line"] <= 5.0 if gate else None,
         note=f"mean distance {m['line_mean']:+.1f} mm; plastic strain > 0.1 instead: {m['line_sheared']:.1f} mm",
         **more,
     )
+    if old:
+        return
     case.record(
         tag + "energy ledger, residual of the potential drop", 0.0, m["residual"], "%", "<= 1 %", m["residual"] <= 1.0, seconds=m["seconds"]
     )
@@ -171,12 +176,13 @@ def record_gates(case, m, mm, gate=True):
 SENSITIVITY = [
     ("viscosity alpha 0.05", {"effects.viscosity": {"alpha": 0.05, "beta": 0.0}}),
     ("viscosity alpha 0.2", {"effects.viscosity": {"alpha": 0.2, "beta": 0.0}}),
-    ("h 1.2", {"space.h": 1.2}),
     ("h 1.5", {"space.h": 1.5}),
-    ("Wendland C2, h 1.5", {"space.h": 1.5, "accuracy.kernel": "wendland c2"}),
+    ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
+    ("opened volume forgotten", {"soil.opened_volume": "forgotten"}),
     ("no stress at the start", {"body.stress": None}),
     ("E x 4", {"soil.young": 4 * 0.84e6}),
     ("floor Coulomb 19.8 deg", {"wall.surface": {"friction_angle": 19.8}}),
+    ("cone plane strain", {"soil.cone": "plane strain"}),
     ("cone plane strain, no dilation", {"soil.cone": "plane strain, no dilation"}),
 ]
 
@@ -215,14 +221,17 @@ def main(quick=False, slow=False):
     sizes = [4] if quick else [4, 2] + ([1] if slow else [])
     shown = []
     for mm in sizes:
-        m = measure(run(scene(mm), "V-EXP-1", f"plane-{mm}mm", minutes=20), mm)
+        m = measure(run(scene(mm), "V-EXP-1", f"shear-{mm}mm", minutes=20), mm)
         record_gates(case, m, mm, gate=mm < 4)
         if quick:
             case.record(
                 "spacing 4 mm: profile error P_d, as a coarse gate", 0.0, m["error"], "%", "<= 5 %", m["error"] <= 5.0, seconds=m["seconds"]
             )
-        shown.append((f"plane-strain cone, {mm:g} mm", f"plane-{mm}mm", m))
+        shown.append((f"cone shear, {mm:g} mm", f"shear-{mm}mm", m))
     mm = 4 if quick else 2
+    m = measure(run(scene(mm, **{"soil.cone": "plane strain"}), "V-EXP-1", f"plane-strain-{mm}mm", minutes=20), mm)
+    record_gates(case, m, mm, gate=False, prefix="old criterion: plane-strain cone, ")
+    shown.append((f"plane-strain cone, {mm:g} mm", f"plane-strain-{mm}mm", m))
     for label, name, changes in (
         ("compression cone", "compression", {"soil.cone": "compression"}),
         ("phi 30 deg", "phi30", {"soil.friction_angle": 30.0}),

@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 """V-EXP-5: failure of a cohesive block, 4 x 2 m, plane strain: where SPH tears soil apart unless the artificial stress holds it.
 
-rho 1850 kg/m^3, E 1.8 MPa, nu 0.3, c 5 kPa, phi 25 deg, psi 0, 50 x 100 particles 40 mm apart, 2 s; plane-strain cone,
-cubic spline with h 1.2 and artificial stress eps 0.5, n 2.55 as in Bui et al. 2008. Smooth wall at x = 0, rough floor.
+rho 1850 kg/m^3, E 1.8 MPa, nu 0.3, c 5 kPa, phi 25 deg, psi 0, 50 x 100 particles 40 mm apart, 2 s; plane-strain cone, artificial
+stress eps 0.5, n 2.55 (the defaults, and those of Bui et al. 2008). Smooth wall at x = 0, rough floor. The cubic spline with h 1.2 of Bui
+et al., for which the criteria were first written, stands beside.
 """
 import sys
 
@@ -17,7 +18,7 @@ def scene(eps, dx=0.04, **changes):
     base = {
         "title": f"V-EXP-5: cohesive block, eps = {eps:g}",
         "dimensions": 2,
-        "space": {"spacing": dx, "h": 1.2},
+        "space": {"spacing": dx},
         "time": {"end": 2.0},
         "soil": {
             "clay": {
@@ -36,7 +37,6 @@ def scene(eps, dx=0.04, **changes):
             {"surface": "smooth", "box": {"low": [-4 * dx, 0.0, 0.0], "high": [0.0, 0.0, 2.4]}},
         ],
         "effects": {"gravity": [0.0, 0.0, -GRAVITY], "viscosity": {"alpha": 0.1, "beta": 0.0}},
-        "accuracy": {"kernel": "cubic spline"},
         "output": {"every": 0.25, "history": 0.01},
     }
     if eps > 0:
@@ -130,6 +130,30 @@ set palette defined (0 '#30307a', 0.5 '#2a9d8f', 1 '#e9c46a', 2 '#d1495b'); set 
     )
 
 
+def record_cubic_spline(case):
+    """The kernel for which the criteria were written."""
+    spline = {"space.h": 1.2, "accuracy.kernel": "cubic spline"}
+    m = {eps: measure(run(scene(eps, **spline), "V-EXP-5", f"cubic-spline-eps-{eps:g}")) for eps in (0.0, 0.5, 1.0)}
+    for eps, old in ((0.5, "old criterion: < 0.1 %"), (0.0, "")):
+        case.record(
+            f"{'old criterion: ' if old else ''}cubic spline, h 1.2, eps {eps:g}: clumped soil",
+            0.0,
+            m[eps]["clumped"],
+            "%",
+            old,
+            seconds=m[eps]["seconds"],
+            note=f"least distance {m[eps]['spacing']:.3f} spacings, {m[eps]['components']} components, crest drop {m[eps]['drop']:.3f} m, "
+            f"voids {m[eps]['cracks']:.2f} %, energy residual {m[eps]['residual']:.3f} %",
+        )
+    case.record(
+        "old criterion: cubic spline, h 1.2, eps 1.0 instead of 0.5: change of the crest drop",
+        0.0,
+        100 * (m[1.0]["drop"] / m[0.5]["drop"] - 1),
+        "%",
+        "old criterion: < 5 %",
+    )
+
+
 def main(quick=False, slow=False):
     case = Case("V-EXP-5")
     if quick:
@@ -187,7 +211,7 @@ def main(quick=False, slow=False):
         "%",
         "<= 1 %",
         None if quick else ledger,
-        note=f"{bad['residual']:.3f} % without artificial stress: the ledger has no entry for its work",
+        note=f"{bad['residual']:.3f} % without artificial stress",
         **more,
     )
     case.control(
@@ -212,16 +236,7 @@ def main(quick=False, slow=False):
             seconds=double["seconds"],
             note=f"energy residual {double['residual']:.1f} %",
         )
-        smooth = measure(run(scene(0.0, **{"space.h": 1.5, "accuracy.kernel": "wendland c2"}), "V-EXP-5", "wendland-eps-0"))
-        case.record(
-            "Wendland C2, h 1.5, no artificial stress: clumped soil",
-            0.0,
-            smooth["clumped"],
-            "%",
-            seconds=smooth["seconds"],
-            note=f"least distance {smooth['spacing']:.3f} spacings, {smooth['components']} components, crest drop {smooth['drop']:.3f} m, "
-            f"voids {smooth['cracks']:.2f} %, energy residual {smooth['residual']:.3f} %",
-        )
+        record_cubic_spline(case)
         draw(case, good, bad)
     return case.done()
 

@@ -14,9 +14,8 @@ struct Settled {
 };
 
 /// An elastic column of 1 m, periodic sideways, that settles under its weight.
-Settled settle(int spacings, const std::string& effects, const std::string& stress)
+Settled settle(int spacings, const std::string& effects, const std::string& stress, SceneText t = {})
 {
-    SceneText t;
     t.spacing = 1.0 / spacings, t.density = 2100, t.young = 15e6;
     const double width = 8 * t.spacing;
     t.space = periodic(width, -1, 3);
@@ -131,6 +130,10 @@ TEST(Columns, SettleToTheirWeight)
         }
         EXPECT_TRUE(c.at_least("observed order of L2, 10 to 50 spacings, " + from, observed_order(L2[0], L2[2], 5), "1", 0.8));
     }
+    const Extra loose{.note = "both gradients are short by the lattice sum of Wendland C2 with h = 1.3 spacings, 0.974", .achieved = 0.06};
+    const auto s = settle(50, "damping = { ratio = 1.0, until = 100.0 }", "none", SceneText{}.with_default_kernel());
+    EXPECT_TRUE(c.at_most("L2 of sigma_zz, 50 spacings, damped gravity, default kernel", s.L2, "1", 0.02, loose));
+    EXPECT_TRUE(c.near("settlement, 50 spacings, damped gravity, default kernel", settlement, s.settlement, "m", 0.05, loose));
     c.curve("stress", {"spacings", "height", "sigma_zz", "sigma_xx", "closed_form_zz"}, rows);
     // Negative control: without damping the column still swings.
     EXPECT_FALSE(c.control_at_most("L2 of sigma_zz, 50 spacings, undamped", settle(50, "", "none").L2, "1", 0.02));
@@ -205,9 +208,6 @@ TEST(Columns, CouetteShearIsLinear)
         c.report("L2 of the velocity at the end" + at, s.velocity, "1");
         c.report("error of the mean shear stress" + at, s.stress, "1");
         if (n < 50) c.report("L2 of the mean velocity" + at, s.displacement, "1");
-        else if (n < 100)
-            EXPECT_TRUE(c.at_most("L2 of the mean velocity" + at, s.displacement, "1", 0.0075,
-                                  {.note = "the cap of 1.5 on 1 + d_B/d_A lets the soil slip by 0.9 spacings", .achieved = 0.011}));
         else EXPECT_TRUE(c.at_most("L2 of the mean velocity" + at, s.displacement, "1", 0.0075));
     }
     EXPECT_TRUE(c.at_least("observed order, 25 to 100 particles", observed_order(L2[0], L2[2], 4), "1", 0.9));

@@ -36,8 +36,9 @@ TEST(Elastic, RingsRebound)
     const double dx = 0.001;
     const auto r = collide(c, dx, 0.3, 4.0e-4);
     EXPECT_TRUE(c.near("pieces after the rebound, dx = r/10", 2, r.pieces, "1", 0));
-    EXPECT_TRUE(c.at_least("least distance, dx = r/10", r.least_distance, "dx", 0.5,
-                           {.note = "measured 0.0115; at r/6 0.65 and r/8 0.64; cause not found", .achieved = 0.005}));
+    EXPECT_TRUE(
+        c.at_least("least distance, dx = r/10", r.least_distance, "dx", 0.5,
+                   {.note = "single particles while the rings meet, none at the end; at r/6 0.69; cause not found", .achieved = 0.1}));
     c.report("particles with a neighbour nearer than 0.6 dx, share, dx = r/10", r.clumped, "1");
     EXPECT_TRUE(c.at_least("speed of parting over that of meeting, dx = r/10", r.speed, "1", 0.5));
     const auto paired = collide(c, 0.00125, 0.3, 4.0e-4, "kernel = \"cubic spline\"");
