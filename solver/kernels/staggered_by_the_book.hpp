@@ -228,13 +228,13 @@ struct Strain {
     bool beside_wall = false;
     double power = 0, next_power = 0; // of moving walls by viscosity, in this step and the next, W/kg
     double friction = 0;              // the most that it carries, without what this step's stress allows, m/s^2
-    Vector crowd{};                   // grad C, 1/m
+    Vector crowd{};                   // grad C of near neighbours, 1/m
     double inside = 0;                // tr M/d, walls among the neighbours
 };
-/// 1 + 0.2 (W/W(spacing))^4: neighbours count more the nearer they are. Lind et al. (2012), eq. 26.
+/// 0.2 (W/W(spacing))^4: near neighbours count. Lind et al. (2012), eq. 26.
 inline double crowding(const Kernel& kernel, double spacing, double r)
 {
-    return 1 + 0.2 * std::pow(kernel.value(r) / kernel.value(spacing), 4);
+    return 0.2 * std::pow(kernel.value(r) / kernel.value(spacing), 4);
 }
 inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> kept, std::span<const GroundPoint> points, const Setting& s,
                         double dt)
