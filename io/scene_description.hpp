@@ -313,8 +313,11 @@ template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
               .doc = "\"staggered\": two passes a step, stable to dt c_p/h of about 1.8; \"leap-frog\": Bui's (2008) one pass, to 0.3"});
     a.choice("accuracy.precision", accuracy.precision, {{"double", scene::Precision::Double}, {"mixed", scene::Precision::Mixed}},
              {.example = "\"double\"", .doc = "\"mixed\": pair sums in single, state in double precision"});
-    a.choice("accuracy.correction", accuracy.correction, {{"none", scene::Correction::None}, {"gradient", scene::Correction::Gradient}},
-             {.example = "\"none\"", .doc = "\"gradient\": velocity gradients exact for linear fields, also at surfaces"});
+    a.choice("accuracy.correction", accuracy.correction,
+             {{"none", scene::Correction::None}, {"gradient", scene::Correction::Gradient}, {"adjoint", scene::Correction::Adjoint}},
+             {.example = "\"none\"",
+              .doc = "\"gradient\": velocity gradients exact for linear fields, also at surfaces; \"adjoint\": pair forces by the same "
+                     "gradients too, so that energy is kept: for soil that holds together"});
     a.number("accuracy.shifting", accuracy.shifting,
              {.unit = "1",
               .range = between(0, 5),

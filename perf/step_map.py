@@ -179,6 +179,9 @@ CASES = {
         0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, accuracy='correction = "gradient"', most=CORRECTED
     ),
     "collapse, gradient correction": Case(0.5, BLOCK, on_floor(), accuracy='correction = "gradient"', most=CORRECTED),
+    "bar, adjoint correction": Case(0.3, THROWN, on_floor_periodic(), **BAR, accuracy='correction = "adjoint"'),
+    "column, adjoint correction": Case(0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, accuracy='correction = "adjoint"'),
+    "collapse, adjoint correction": Case(0.5, BLOCK, on_floor(), accuracy='correction = "adjoint"'),
     "collapse, mixed precision": Case(0.5, BLOCK, on_floor(), accuracy='precision = "mixed"'),
     "bar, 3-D": Case(
         0.15,
@@ -188,6 +191,16 @@ CASES = {
         space=PERIODIC_3D,
         gravity=False,
         kernels=KERNELS[:3],  # the support of the fourth is wider than the period
+    ),
+    "bar, adjoint correction, 3-D": Case(
+        0.15,
+        [box((0.0, 0.0, 0.0), (0.4, 0.4, 0.5), FALL)],
+        on_floor_periodic(deep=0.4),
+        **{**SOLID, "strength": ELASTIC},
+        space=PERIODIC_3D,
+        gravity=False,
+        kernels=KERNELS[:3],
+        accuracy='correction = "adjoint"',
     ),
     "collapse, 3-D": Case(0.3, CUBE, on_floor(reach=0.4), **SOLID, kernels=KERNELS),
     "impact, Mach 0.3, fixed step": Case(**impact(), beta=2.0),

@@ -42,6 +42,11 @@ inline constexpr struct Acceleration : Field<"acceleration", "m/s^2", Shape::Vec
 } acceleration;
 inline constexpr struct StressRate : Field<"stress_rate", "Pa/s", Shape::Symmetric> {
 } stress_rate;
+// Only where pair forces are by corrected gradients: the correction that they take, and that of the strain before (M^-1).
+inline constexpr struct GradientMatrix : Field<"gradient_matrix", "1", Shape::Symmetric> {
+} gradient_matrix;
+inline constexpr struct StrainMatrix : Field<"strain_matrix", "1", Shape::Symmetric> {
+} strain_matrix;
 // Only where particles are shifted: the velocity at which they are beside their own, and what that changes of their own.
 inline constexpr struct Shift : Field<"shift", "m/s", Shape::Vector> {
 } shift;
@@ -90,10 +95,10 @@ inline constexpr struct Activity : Field<"activity", "1", Shape::Scalar, std::in
 /// Of field::activity: moves, or is about to; calm; asleep, its state kept until soil is looked at again.
 enum class Activity : std::int32_t { Moves = 0, Calm = 1, Asleep = 2 };
 
-using AllFields =
-    std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
-               field::Acceleration, field::StressRate, field::Shift, field::ShiftAcceleration, field::WallSlip, field::WallPressure,
-               field::WallFriction, field::WallForce, field::Load, field::LoadPush, field::Unstored, field::HalfVelocity,
-               field::HalfDensity, field::HalfStress, field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
+using AllFields = std::tuple<field::Position, field::Velocity, field::Density, field::Stress, field::PlasticStrain, field::OpenedVolume,
+                             field::Acceleration, field::StressRate, field::GradientMatrix, field::StrainMatrix, field::Shift,
+                             field::ShiftAcceleration, field::WallSlip, field::WallPressure, field::WallFriction, field::WallForce,
+                             field::Load, field::LoadPush, field::Unstored, field::HalfVelocity, field::HalfDensity, field::HalfStress,
+                             field::SortedPosition, field::Origin, field::Id, field::Soil, field::Activity>;
 
 } // namespace kuzure

@@ -5,6 +5,7 @@
 //
 // Law of every effect (tests/unit/pass_test.cpp): a coefficient of zero changes no bit of the result.
 #include "solver/core/tensor.hpp"
+#include "solver/pairs/batch.hpp"
 #include "solver/scene/parts.hpp"
 
 namespace kuzure {
@@ -54,6 +55,24 @@ struct Viscosity {
 struct NoViscosity {
     static NoViscosity from(const scene::Effects&, double) { return {}; }
     static bool covers(const scene::Effects& e) { return !e.viscosity; }
+};
+
+/// sum V_j rho_i rho_j Pi grad W: the force of viscosity, against the particle's.
+struct ViscousForce {
+    template <class V> struct Sums {
+        Vec3<V> viscous;
+    };
+    static constexpr double flops = 6;
+    template <class V> KUZURE_INLINE void add(Sums<V>& to, const Batch<V>& batch) const
+    {
+        for (int k = 0; k < batch.size; ++k) to.viscous = fma(batch.at[k].rho2_Pi, batch.at[k].grad, to.viscous);
+    }
+};
+struct NoViscousForce {
+    template <class V> struct Sums {
+    };
+    static constexpr double flops = 0;
+    template <class V> KUZURE_INLINE void add(Sums<V>&, const Batch<V>&) const {}
 };
 
 } // namespace kuzure

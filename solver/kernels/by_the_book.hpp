@@ -27,6 +27,7 @@ using Matrix = Mat3<double>;
 inline Matrix outer(Vector a, Vector b) { return {a.x * b, a.y * b, a.z * b}; }
 inline Matrix operator+(const Matrix& a, const Matrix& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Matrix operator*(double s, const Matrix& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Vector operator*(const Matrix& a, Vector b) { return {dot(a.x, b), dot(a.y, b), dot(a.z, b)}; }
 /// sigma : L, the stress power
 inline double contract(const Stress& s, const Matrix& L) { return kuzure::contract(s, symmetric_part(L)); }
 

@@ -46,9 +46,9 @@ protected:
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
 
     /// Geometry: r 3, r.r 5, reciprocal 1, length 1, t 2, F and volume 8, grad W 3. Update: 60.
-    static Stage force_stage()
+    Stage force_stage() const
     {
-        return {"force", sizeof(Stresses<T>) + (M::tensile ? sizeof(Tension<T>) : 0),
+        return {"force", sizeof(Stresses<T>) + (Below::adjoint() ? sizeof(Traction<T>) : 0) + (M::tensile ? sizeof(Tension<T>) : 0),
                 23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops + M::CarriedTerm::flops + M::more_flops,
                 60, 25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
@@ -109,6 +109,7 @@ private:
         const auto at = Below::lengths();
         const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Below::in_tension(i, tension_);
+        const bool adjoint = Below::adjoint();
         const Vec3<V> shift = Below::shift_of(in, i, carries);
         const bool shifted = carries && any(shift);
         Batch<V> batch;
@@ -134,8 +135,10 @@ private:
                     }
                 }
                 // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
-                StressForce{}.add(
-                    sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
+                if (adjoint) CorrectedForce{}.add(sums, batch, Below::tractions_.data());
+                else
+                    StressForce{}.add(
+                        sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
                 if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
                 if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
                 if constexpr (carries)
@@ -208,7 +211,9 @@ private:
         const Vec3<U> viscous = was[field::acceleration].template load<U>(lanes.at);
         const U per_rho = factor / rho;
 
-        const Vec3<U> stress = per_rho * (sums.force + sigma * sums.grad_one);
+        Vec3<U> own = sums.grad_one;
+        if (Below::adjoint()) own = was[field::gradient_matrix].template load<U>(lanes.at) * own;
+        const Vec3<U> stress = per_rho * (sums.force + sigma * own);
         Vec3<U> artificial{zero, zero, zero}, wall = artificial, by_loads = artificial;
         if constexpr (M::tensile) {
             const auto tau = lane_by_lane<Sym3, U>([&](int k) {

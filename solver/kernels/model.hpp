@@ -38,6 +38,7 @@ struct Model {
     Diffusive stress_diffusion;
     Corrected correction;
     bool correct; // a model with the correction compiled in also serves scenes without
+    bool adjoint; // pair forces by the corrected gradients too
     Shifted shifting;
     std::tuple<More...> more;
 
@@ -49,7 +50,8 @@ struct Model {
                 Tensile::from(s.effects, kernel, s.spacing / unit),
                 Diffusive::from(s.effects),
                 {},
-                s.correction == scene::Correction::Gradient,
+                s.correction != scene::Correction::None,
+                s.correction == scene::Correction::Adjoint,
                 Shifted::from(s.shifting, kernel, s.spacing / unit),
                 {More::from(s, unit)...}};
     }

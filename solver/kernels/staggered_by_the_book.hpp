@@ -226,10 +226,11 @@ struct Strain {
     Matrix L{}, L_walls{}; // 1/s; the latter is a part of the former
     Vector viscous{};      // acceleration, m/s^2
     bool beside_wall = false;
-    double power = 0, next_power = 0; // of moving walls by viscosity, in this step and the next, W/kg
-    double friction = 0;              // the most that it carries, without what this step's stress allows, m/s^2
-    Vector crowd{};                   // grad C of near neighbours, 1/m
-    double inside = 0;                // tr M/d, walls among the neighbours
+    double power = 0, next_power = 0;          // of moving walls by viscosity, in this step and the next, W/kg
+    double friction = 0;                       // the most that it carries, without what this step's stress allows, m/s^2
+    Matrix K{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; // correction of gradients
+    Vector crowd{};                            // grad C of near neighbours, 1/m
+    double inside = 0;                         // tr M/d, walls among the neighbours
 };
 /// 0.2 (W/W(spacing))^4: near neighbours count. Lind et al. (2012), eq. 26.
 inline double crowding(const Kernel& kernel, double spacing, double r)
@@ -289,7 +290,8 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
     if (kept[k].pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
-    if (s.how.correction == scene::Correction::Gradient && !of_i.beside_wall) of_i.L = corrected(of_i.L, M, s.how.dimensions);
+    if (s.how.correction != scene::Correction::None && !of_i.beside_wall)
+        of_i.L = corrected(of_i.L, M, s.how.dimensions), of_i.K = corrected(of_i.K, M, s.how.dimensions);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
     of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;
@@ -349,9 +351,10 @@ struct Forced {
     enum class Contact { None, Presses, Approached, LetGo } contact = Contact::None; // with Coulomb faces
     enum class Rubs { Not, Sticks, Slides } rubs = Rubs::Not;
 };
-/// `kept.acceleration` is the viscous one of this step; dt is its length, `next` that of the one to come, s.
-inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const GroundPoint> points, const Setting& s, double dt,
-                       double next)
+/// `K`: corrections of pair forces; none: they are not corrected. `kept.acceleration` is the viscous one of this step; dt is its length,
+/// `next` that of the one to come, s.
+inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const Matrix> K, std::span<const GroundPoint> points,
+                       const Setting& s, double dt, double next)
 {
     const Kernel kernel = s.kernel();
     const scene::Effects& e = s.how.effects;
@@ -377,7 +380,8 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         ++of_i.pairs;
         const Particle j = particle(soil, l, s);
         const Vector grad = kernel.gradient(x_ij);
-        stress = stress + j.volume * ((i.stress + j.stress) * grad);
+        // sigma_i K_i + sigma_j K_j, adjoint to the strain's K_i grad W
+        stress = stress + j.volume * (K.empty() ? (i.stress + j.stress) * grad : i.stress * (K[k] * grad) + j.stress * (K[l] * grad));
         inward = inward + 2 * j.volume * grad;
         if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
         if (e.stress_diffusion)

@@ -21,6 +21,15 @@ template <class T> struct alignas(8 * sizeof(T)) Stresses {
     T xx, yy, zz, xy, yz, xz;
     T volume, awake;
 };
+/// sigma K, K the correction of its gradients; only models that correct pair forces read and write it. Pa.
+template <class T> struct alignas(4 * sizeof(T)) Traction {
+    T xx, xy, xz, yx, yy, yz, zx, zy, zz, spare[3];
+};
+template <class T> Traction<T> make_traction(const Stress& s, const Stress& K)
+{
+    const Vector x = K * Vector{s.xx, s.xy, s.xz}, y = K * Vector{s.xy, s.yy, s.yz}, z = K * Vector{s.xz, s.yz, s.zz};
+    return {T(x.x), T(x.y), T(x.z), T(y.x), T(y.y), T(y.z), T(z.x), T(z.y), T(z.z), {}};
+}
 /// How it is shifted beside that, m/s; only models that shift particles read and write it.
 template <class T> struct alignas(4 * sizeof(T)) ShiftOf {
     T x, y, z, spare;
@@ -40,6 +49,7 @@ public:
     {
         p.require(field::acceleration);
         if (M::diffusive || shifting()) p.require(field::stress_rate);
+        if (adjoint()) p.require(field::gradient_matrix, field::strain_matrix);
         if (shifting()) p.require(field::shift, field::shift_acceleration);
         if (coulomb) p.require(field::wall_slip, field::wall_pressure, field::wall_friction);
     }
@@ -47,8 +57,8 @@ public:
     std::size_t bytes() const override
     {
         return kinematics_.capacity() * sizeof(Kinematics<T>) + stresses_.capacity() * sizeof(Stresses<T>) +
-               tension_.capacity() * sizeof(Tension<T>) + shifts_.capacity() * sizeof(ShiftOf<T>) + speed_.capacity() * sizeof(T) +
-               wall_bytes();
+               tension_.capacity() * sizeof(Tension<T>) + shifts_.capacity() * sizeof(ShiftOf<T>) +
+               tractions_.capacity() * sizeof(Traction<T>) + speed_.capacity() * sizeof(T) + wall_bytes();
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
@@ -58,6 +68,7 @@ public:
         kinematics_.resize(count), stresses_.resize(count);
         if (M::tensile) tension_.resize(count);
         if (shifting()) shifts_.resize(count);
+        if (adjoint()) tractions_.resize(count);
         if (soils.size() > 1) speed_.resize(count);
         const bool sleepy = p.has(field::activity);
 #pragma omp parallel for schedule(static)
@@ -71,12 +82,14 @@ public:
             stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
             if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
             if (shifting()) shifts_[i] = shift_of(p[field::shift][i]);
+            if (adjoint()) tractions_[i] = make_traction<T>(s, p[field::gradient_matrix][i]);
         }
         for (std::size_t k = n; k < count; ++k) {
             kinematics_[k] = far_away<T, Kinematics>();
             stresses_[k] = {};
             if (M::tensile) tension_[k] = {};
             if (shifting()) shifts_[k] = {};
+            if (adjoint()) tractions_[k] = {};
         }
         if (soils.size() > 1) {
             for (Index i = 0; i < n; ++i) speed_[i] = T(soils[p[field::soil][i]].c_p);
@@ -147,8 +160,9 @@ public:
             if (shifting()) std::memcpy(to + sizeof r, &shifts_[owned], sizeof(ShiftOf<T>));
             return;
         }
-        std::memcpy(to, &stresses_[owned], sizeof(Stresses<T>));
-        if constexpr (M::tensile) std::memcpy(to + sizeof(Stresses<T>), &tension_[owned], sizeof(Tension<T>));
+        std::memcpy(to, &stresses_[owned], sizeof(Stresses<T>)), to += sizeof(Stresses<T>);
+        if (adjoint()) std::memcpy(to, &tractions_[owned], sizeof(Traction<T>)), to += sizeof(Traction<T>);
+        if constexpr (M::tensile) std::memcpy(to, &tension_[owned], sizeof(Tension<T>));
     }
     void unpack(int stage, Index slot, const std::byte* from) override
     {
@@ -157,8 +171,9 @@ public:
             if (shifting()) std::memcpy(&shifts_[n_ + slot], from + sizeof(Kinematics<T>), sizeof(ShiftOf<T>));
             return;
         }
-        std::memcpy(&stresses_[n_ + slot], from, sizeof(Stresses<T>));
-        if constexpr (M::tensile) std::memcpy(&tension_[n_ + slot], from + sizeof(Stresses<T>), sizeof(Tension<T>));
+        std::memcpy(&stresses_[n_ + slot], from, sizeof(Stresses<T>)), from += sizeof(Stresses<T>);
+        if (adjoint()) std::memcpy(&tractions_[n_ + slot], from, sizeof(Traction<T>)), from += sizeof(Traction<T>);
+        if constexpr (M::tensile) std::memcpy(&tension_[n_ + slot], from, sizeof(Tension<T>));
     }
     void end_stage(int) override {}
 
@@ -206,6 +221,12 @@ protected:
     using Base::unit_, Base::h_, Base::volume_, Base::model_, Base::fixed_;
     using typename Base::T, typename Base::U;
 
+    /// True where this run's pair forces are by corrected gradients.
+    bool adjoint() const
+    {
+        if constexpr (M::corrected) return model_.adjoint;
+        else return false;
+    }
     /// True where this run shifts particles: a model that can also serves scenes without.
     bool shifting() const
     {
@@ -284,6 +305,7 @@ protected:
     Array<Stresses<T>> stresses_;
     Array<Tension<T>> tension_;
     Array<ShiftOf<T>> shifts_;
+    Array<Traction<T>> tractions_;
     Array<T> speed_; // c_p by record, where there are several soils
 };
 

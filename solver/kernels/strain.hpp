@@ -6,24 +6,6 @@
 
 namespace kuzure {
 
-/// sum V_j rho_i rho_j Pi grad W: the force of viscosity, against the particle's.
-struct ViscousForce {
-    template <class V> struct Sums {
-        Vec3<V> viscous;
-    };
-    static constexpr double flops = 6;
-    template <class V> KUZURE_INLINE void add(Sums<V>& to, const Batch<V>& batch) const
-    {
-        for (int k = 0; k < batch.size; ++k) to.viscous = fma(batch.at[k].rho2_Pi, batch.at[k].grad, to.viscous);
-    }
-};
-struct NoViscousForce {
-    template <class V> struct Sums {
-    };
-    static constexpr double flops = 0;
-    template <class V> KUZURE_INLINE void add(Sums<V>&, const Batch<V>&) const {}
-};
-
 template <class Below> class StrainStage : public Below {
     using M = typename Below::Model;
     using V = typename Below::LaneType;
@@ -204,6 +186,17 @@ private:
         const auto kept = p[field::wall_force];
         kept.store(lanes.at, select(written<U>(lanes), force, kept.template load<U>(lanes.at)), lanes.n);
     }
+    /// What corrects the pair forces of the step's end, from this step's correction and that of the strain before, both of mid-step; one
+    /// that jumps is none to go on from. Sleepers keep theirs.
+    static void keep_correction(const StepInput& in, const Lanes& lanes, Sym3<U> K)
+    {
+        const auto at_end = (*in.particles)[field::gradient_matrix], before = (*in.particles)[field::strain_matrix];
+        const auto mine = written<U>(lanes);
+        const Sym3<U> old = before.template load<U>(lanes.at), change = K - old;
+        const U on = select(less(contract(change, change), U(0.01)), U(in.dt > 0 ? 0.5 * in.dt / in.kick : 0.0), U(0.0));
+        at_end.store(lanes.at, select(mine, fma(on, change, K), at_end.template load<U>(lanes.at)), lanes.n);
+        before.store(lanes.at, select(mine, K, old), lanes.n);
+    }
     struct Strained {
         Sym3<U> sigma;
         U rho, plastic_strain;
@@ -268,6 +261,7 @@ private:
                 const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
                 const Sym3<U> correction = GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - feels_wall);
                 L = {correction * L.x, correction * L.y, correction * L.z};
+                if (model_.adjoint) keep_correction(in, lanes, correction);
             }
         if (walled) {
             // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy
@@ -395,6 +389,10 @@ private:
             r.xy = T(fields[3][k]), r.yz = T(fields[4][k]), r.xz = T(fields[5][k]);
             r.volume = T(fields[6][k]);
             if (activity) r.awake = T(activity[lanes.at + k] == std::int32_t(Activity::Moves));
+            if (Below::adjoint())
+                Below::tractions_[lanes.at + k] =
+                    make_traction<T>(Stress{fields[0][k], fields[1][k], fields[2][k], fields[3][k], fields[4][k], fields[5][k]},
+                                     std::as_const(*in.particles)[field::gradient_matrix][lanes.at + k]);
             if constexpr (M::tensile)
                 tension_[lanes.at + k] =
                     make_tension<T>(Stress{fields[0][k], fields[1][k], fields[2][k], fields[3][k], fields[4][k], fields[5][k]},

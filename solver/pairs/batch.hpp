@@ -63,4 +63,20 @@ struct StressForce {
     }
 };
 
+/// sum_j V_j (sigma_j K_j) grad W in place of the former, K the correction of each particle's gradients.
+struct CorrectedForce {
+    /// `traction`: records with the rows of sigma K, xx ... zz.
+    template <class V, class R> KUZURE_INLINE void add(StressForce::Sums<V>& to, const Batch<V>& batch, const R* traction) const
+    {
+        for (int k = 0; k < batch.size; ++k) {
+            const R& j = traction[batch.neighbour[k]];
+            const Vec3<V> g = batch.at[k].grad;
+            to.force.x = fma(V(j.xz), g.z, fma(V(j.xy), g.y, fma(V(j.xx), g.x, to.force.x)));
+            to.force.y = fma(V(j.yz), g.z, fma(V(j.yy), g.y, fma(V(j.yx), g.x, to.force.y)));
+            to.force.z = fma(V(j.zz), g.z, fma(V(j.zy), g.y, fma(V(j.zx), g.x, to.force.z)));
+            to.grad_one = to.grad_one + g;
+        }
+    }
+};
+
 } // namespace kuzure

@@ -65,6 +65,9 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
         rules.warning("accuracy.cfl",
                       text("{} is stable but above the recommended {:.3g}", scene.accuracy.cfl, recommended_courant(scene)));
     }
+    if (scene.accuracy.correction == Correction::Adjoint && scene.accuracy.scheme == Scheme::LeapFrog)
+        rules.error("accuracy.correction", "expected \"none\" or \"gradient\" with the leap-frog scheme, found \"adjoint\". Remedy: "
+                                           "accuracy.scheme = \"staggered\"");
     if (scene.accuracy.shifting > 0 && scene.accuracy.scheme == Scheme::LeapFrog)
         rules.error("accuracy.shifting", text("expected 0, found {}: the leap-frog scheme shifts no particles. Remedy: "
                                               "accuracy.scheme = \"staggered\", or no shifting",

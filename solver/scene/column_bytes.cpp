@@ -15,6 +15,7 @@ double column_bytes(const Scene& scene, const Filling& filling)
         if (is(field::acceleration)) return !leap_frog;
         const bool shifts = !leap_frog && scene.accuracy.shifting > 0;
         if (is(field::stress_rate)) return shifts || (!leap_frog && scene.effects.stress_diffusion.has_value());
+        if (is(field::gradient_matrix, field::strain_matrix)) return scene.accuracy.correction == Correction::Adjoint;
         if (is(field::shift, field::shift_acceleration)) return shifts;
         if (is(field::wall_slip, field::wall_pressure, field::wall_friction)) return !leap_frog && coulomb;
         if (is(field::wall_force)) return !leap_frog && std::ranges::any_of(scene.walls, [](const Wall& w) { return !w.name.empty(); });

@@ -153,10 +153,11 @@ private:
 
     void accuracy()
     {
-        const bool corrected = scene_.accuracy.correction == Correction::Gradient;
+        const bool corrected = scene_.accuracy.correction != Correction::None, adjoint = scene_.accuracy.correction == Correction::Adjoint;
         note("gradient_correction", corrected,
-             corrected ? "velocity gradients exact for linear fields; stress power no longer that of the pair forces"
-                       : "accuracy.correction = \"none\"");
+             adjoint     ? "velocity gradients exact for linear fields, pair forces adjoint to them"
+             : corrected ? "velocity gradients exact for linear fields; stress power no longer that of the pair forces"
+                         : "accuracy.correction = \"none\"");
         const double shifting = scene_.accuracy.shifting;
         note("shifting", shifting > 0,
              shifting > 0

@@ -174,7 +174,8 @@ struct EffectNote {
 // ---- what decides between pair models ----
 enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
 enum class Precision { Double, Mixed };
-enum class Correction { None, Gradient };
+/// Of kernel gradients at free surfaces: in the velocity gradient alone, or in the pair forces too.
+enum class Correction { None, Gradient, Adjoint };
 /// How a step is made of passes over pairs: Bui's one pass, or the two-pass staggered leap-frog.
 enum class Scheme { Staggered, LeapFrog };
 

@@ -171,7 +171,7 @@ CASES = {
     "not_offered_walls": ([("[accuracy]", '[accuracy]\nwalls = "extrapolated"')], r"accuracy\.walls: expected a known key"),
     "not_offered_correction": (
         [("[accuracy]", '[accuracy]\ncorrection = "kernel"')],
-        r'accuracy\.correction: expected one of "none", "gradient", found "kernel"',
+        r'accuracy\.correction: expected one of "none", "gradient", "adjoint", found "kernel"',
     ),
     "quoted_path": ([("dimensions = 3", 'dimensions = 3\n"space.h" = 1.2')], r'expected a known key, found "space\.h"'),
     "not_toml": ([("end = 1.0", "end = = 1.0")], r":8: expected TOML, found an error"),
@@ -559,15 +559,22 @@ CASES = {
         eff("pore_pressure = { table = [0.0, 4.0] }"),
         r":21: effects\.pore_pressure\.table: expected an array of corners \[x, z\] in m, found 0 as a corner",
     ),
+    "adjoint_in_one_pass": (
+        acc('scheme = "leap-frog"\ncorrection = "adjoint"'),
+        r'accuracy\.correction: expected "none" or "gradient" with the leap-frog scheme, found "adjoint"',
+    ),
     "shifting_in_one_pass": (
         acc('scheme = "leap-frog"\nshifting = 2.0'),
         r'accuracy\.shifting: expected 0, found 2: the leap-frog scheme shifts no particles\. Remedy: accuracy\.scheme = "staggered"',
     ),
     "shifting_beyond_range": (acc("shifting = 7.0"), r":22: accuracy\.shifting: expected .* 5.*, found 7"),
-    "correction_is_true": (acc("correction = true"), r':22: accuracy\.correction: expected one of "none", "gradient", found true'),
+    "correction_is_true": (
+        acc("correction = true"),
+        r':22: accuracy\.correction: expected one of "none", "gradient", "adjoint", found true',
+    ),
     "correction_misspelt": (
         acc('correction = "gradients"'),
-        r':22: accuracy\.correction: expected one of "none", "gradient", found "gradients"',
+        r':22: accuracy\.correction: expected one of "none", "gradient", "adjoint", found "gradients"',
     ),
     "precision_is_a_number": (acc("precision = 32"), r':22: accuracy\.precision: expected one of "double", "mixed", found 32'),
     "kernel_is_a_number": (

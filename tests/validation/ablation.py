@@ -61,6 +61,7 @@ EFFECTS = {
     "mixed precision": {s: (NONE, MIXED) for s in SCENES},
     "stress diffusion": {s: (NONE, DIFFUSION) for s in SCENES},
     "gradient correction": {s: (NONE, GRADIENT) for s in SCENES},
+    "adjoint correction": {s: (NONE, {"accuracy.correction": "adjoint", "accuracy.cfl": 0.8}) for s in SCENES},
     "shifting, constant 2": {s: (NONE, {"accuracy.shifting": 2.0}) for s in SCENES},
     "softening": {"block": (NONE, {"soil.softening": {"cohesion": 2500.0, "friction_angle": 20.0, "slip": 0.1}})},
     "mu(I) friction": {"column": (NONE, {"soil.rate_friction": {"friction_angle": 30.0, "grain": 0.0015, "grain_density": 2700.0}})},

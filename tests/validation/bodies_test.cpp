@@ -33,6 +33,7 @@ Spun spin(Case& c, const std::string& name, int dimensions, double spacing, doub
     SceneText t;
     t.dimensions = dimensions, t.spacing = spacing, t.h = 1.5;
     t.accuracy = fmt::format("kernel = \"wendland c2\"\ncorrection = \"{}\"", correction);
+    if (correction == "adjoint") t.accuracy += "\ncfl = 0.8";
     t.effects = "viscosity = { alpha = 0.1, beta = 0.0 }";
     t.bodies = sphere({0, 0, 0}, R);
     t.end = 1e-12, t.time = "step = 1.0e-12";
@@ -120,6 +121,21 @@ TEST(Bodies, SpinOfTheCorrectedGradientIsKept)
         EXPECT_TRUE(
             c.at_most(name + ": drift of angular momentum a turn", s.angular_drift, "1", 1e-3,
                       {.note = "stress forces are not central, and the correction is in the velocity gradient alone", .achieved = 3e-3}));
+        EXPECT_EQ(s.pieces, 1);
+    }
+}
+
+TEST(Bodies, SpinOfAdjointForcesIsKept)
+{
+    Case c("SPH-3");
+    for (const int dimensions : {2, 3}) {
+        const std::string name = dimensions == 2 ? "disc, adjoint" : "sphere, adjoint";
+        const double turns = dimensions == 2 ? 10 : 2;
+        const auto s =
+            spin(c, dimensions == 2 ? "disc_adjoint" : "sphere_adjoint", dimensions, dimensions == 2 ? 0.05 : 0.1, turns, "adjoint");
+        EXPECT_TRUE(c.at_most(fmt::format("{}, {} turns: change of radius", name, turns), s.radius_change, "1", 0.01));
+        EXPECT_TRUE(c.at_most(name + ": linear momentum over m v", s.momentum, "1", 1e-12));
+        EXPECT_TRUE(c.at_most(name + ": drift of angular momentum a turn", s.angular_drift, "1", 1e-3));
         EXPECT_EQ(s.pieces, 1);
     }
 }
