@@ -320,7 +320,7 @@ template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
                      "gradients too, so that energy is kept: for soil that holds together"});
     a.number("accuracy.shifting", accuracy.shifting,
              {.unit = "1",
-              .range = between(0, 5),
+              .range = between(0, 3),
               .fallback = "0.0",
               .example = "1.0",
               .doc = "particles that shear plastically are shifted towards even spacing, by this constant (docs/theory.md); 0: not"});
