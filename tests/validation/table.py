@@ -14,6 +14,8 @@ import sys
 from common import COLOURS, FIGURES, RESULTS, figure
 from known import MISSES
 
+# What the names of curves say of the correction of gradients.
+HOW_CORRECTED = {"_corrected": ", corrected gradient", "_adjoint": ", forces too"}
 # Between these two lines of a page stands what is rendered; the rest of the page is written by hand.
 BEGIN, END = "<!-- measured -->\n", "<!-- end -->"
 
@@ -149,11 +151,16 @@ plot '{column}' every ::1 using ($5/1e3):2 with lines lw 2 lc rgb '#000000' titl
         )
     tips = {}
     for path in sorted(glob.glob(os.path.join(RESULTS, "SPH-5*_tip_*_0.05_0.3*.csv"))):
-        tips[int(os.path.basename(path).split("_tip_")[1].split("_")[0]), "corrected" in path] = path
+        tips[
+            int(os.path.basename(path).split("_tip_")[1].split("_")[0]),
+            next((words for word, words in HOW_CORRECTED.items() if word in path), ""),
+        ] = path
     if tips:
+        spacings, hows = sorted({n for n, _ in tips}), ["", *HOW_CORRECTED.values()]
         lines = ", ".join(
-            f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 lc rgb '{COLOURS[k]}' title 'H/dx = {n}{', corrected gradient' if c else ''}'"
-            for k, ((n, c), p) in enumerate(sorted(tips.items()))
+            f"'{p}' every ::1 using 1:(1e3*$2) with lines lw 2 dt {1 + hows.index(c)} lc rgb '{COLOURS[spacings.index(n)]}' "
+            f"title 'H/dx = {n}{c}'"
+            for (n, c), p in sorted(tips.items())
         )
         drawn["SPH-5"] = figure(
             "swinging_plate",
