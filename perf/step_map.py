@@ -148,6 +148,14 @@ def impact():
 
 PLAIN = dict(kernels=KERNELS, alphas=ALPHAS)
 SOLID = dict(dimensions=3, dx=0.05, strength=SAND_3D)
+BAR_3D = dict(
+    bodies=[box((0.0, 0.0, 0.0), (0.4, 0.4, 0.5), FALL)],
+    walls=on_floor_periodic(deep=0.4),
+    **{**SOLID, "strength": ELASTIC},
+    space=PERIODIC_3D,
+    gravity=False,
+    kernels=KERNELS[:3],  # the support of the fourth is wider than the period
+)
 CASES = {
     "bar": Case(0.3, THROWN, on_floor_periodic(), **BAR, **PLAIN),
     "column": Case(0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, **PLAIN),
@@ -183,25 +191,8 @@ CASES = {
     "column, adjoint correction": Case(0.4, UPRIGHT, on_floor_periodic(), space=PERIODIC, accuracy='correction = "adjoint"'),
     "collapse, adjoint correction": Case(0.5, BLOCK, on_floor(), accuracy='correction = "adjoint"'),
     "collapse, mixed precision": Case(0.5, BLOCK, on_floor(), accuracy='precision = "mixed"'),
-    "bar, 3-D": Case(
-        0.15,
-        [box((0.0, 0.0, 0.0), (0.4, 0.4, 0.5), FALL)],
-        on_floor_periodic(deep=0.4),
-        **{**SOLID, "strength": ELASTIC},
-        space=PERIODIC_3D,
-        gravity=False,
-        kernels=KERNELS[:3],  # the support of the fourth is wider than the period
-    ),
-    "bar, adjoint correction, 3-D": Case(
-        0.15,
-        [box((0.0, 0.0, 0.0), (0.4, 0.4, 0.5), FALL)],
-        on_floor_periodic(deep=0.4),
-        **{**SOLID, "strength": ELASTIC},
-        space=PERIODIC_3D,
-        gravity=False,
-        kernels=KERNELS[:3],
-        accuracy='correction = "adjoint"',
-    ),
+    "bar, 3-D": Case(0.15, **BAR_3D),
+    "bar, adjoint correction, 3-D": Case(0.15, **BAR_3D, accuracy='correction = "adjoint"'),
     "collapse, 3-D": Case(0.3, CUBE, on_floor(reach=0.4), **SOLID, kernels=KERNELS),
     "impact, Mach 0.3, fixed step": Case(**impact(), beta=2.0),
     "impact, Mach 0.3, accuracy.cfl": Case(**impact(), beta=2.0, rule=True),
