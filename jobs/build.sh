@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Configure and build one preset of CMakePresets.json: jobs/build.sh PRESET [TARGET...]. Quiet unless it fails; the
-# output is in build/PRESET.log. KUZURE_CMAKE: more options of cmake, such as -DKUZURE_FIRST_VARIANT=8.
+# output is in build/PRESET.log. KUZURE_CMAKE: more options of cmake, such as -DKUZURE_FIRST_VARIANT=-3.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source jobs/environment.sh

@@ -100,9 +100,14 @@ struct Cloud {
         in.forces.gravity = scene.effects.gravity.value_or(Vector{});
         // a scheme may read half a step back from the positions its lists are pruned at
         double fastest = 0;
-        for (Index i = 0; i < particles.size(); ++i) fastest = std::max(fastest, length(std::as_const(particles)[field::velocity][i]));
+        for (Index i = 0; i < particles.size(); ++i) {
+            const Vector v = std::as_const(particles)[field::velocity][i];
+            const Vector w = particles.has(field::shift) ? std::as_const(particles)[field::shift][i] : Vector{};
+            fastest = std::max(fastest, length(v) + length(w));
+        }
         in.margin = 2 * dt * fastest;
         for (const auto& m : soils) in.evolving = in.evolving || m.evolves(), in.remembering = in.remembering || m.remembers > 0;
+        in.shifts = in.shifted = scene.accuracy.shifting > 0;
         return in;
     }
     /// Sorted, with lists for a model, its records and walls; the cloud may not move while the model is used.

@@ -49,7 +49,8 @@ protected:
     Stage force_stage() const
     {
         return {"force", sizeof(Stresses<T>) + (Below::adjoint() ? sizeof(Traction<T>) : 0) + (M::tensile ? sizeof(Tension<T>) : 0),
-                23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops + M::CarriedTerm::flops + M::more_flops,
+                23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops +
+                    (Below::shifting() ? M::CarriedTerm::flops / Shifting::every : 0) + M::more_flops,
                 60, 25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
     PassResult run_force(const StepInput& in, std::span<const Index> clusters)
@@ -69,9 +70,8 @@ private:
         const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
         ForceSums<Wide> sums;
         // every particle meets itself once in its list
-        const bool carries = Below::shifting() && in.shifts;
         tally.pairs +=
-            (carries ? sum_forces<M::shifts>(in, i, near, sums) : sum_forces<false>(in, i, near, sums)) - std::popcount(i.moving);
+            (in.shifts ? sum_forces<M::shifts>(in, i, near, sums) : sum_forces<false>(in, i, near, sums)) - std::popcount(i.moving);
         unsigned awake = 0;
         if (in.sleep == SleepStage::Freeze) awake = awake_near(i, near, kinematics_.data(), stresses_.data(), 2 * model_.kernel.h);
         ForceWalls<Wide> walls{};
@@ -223,8 +223,8 @@ private:
             artificial = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
-        if (M::diffusive || (Below::shifting() && in.shifts)) rate_of_stress(in, sums, sigma, soil, lanes);
-        if (Below::shifting() && in.shifted) artificial = artificial + was[field::shift_acceleration].template load<U>(lanes.at);
+        if (M::diffusive || in.shifts) rate_of_stress(in, sums, sigma, soil, lanes);
+        if (in.shifted) artificial = artificial + was[field::shift_acceleration].template load<U>(lanes.at);
         if (walled) {
             Watts watts{zero, zero};
             wall = wall_acceleration(in, wall_sums, lanes, U(volume_) * soil.rho0 / rho, rho, power, watts);
@@ -285,7 +285,7 @@ private:
         const auto mine = written<U>(lanes);
         const Vec3<U> coming = fma(half_next, m.a, m.v);
         Vec3<U> way = coming;
-        if (Below::shifting() && in.shifts) way = way + p[field::shift].template load<U>(lanes.at);
+        if (in.shifts) way = way + p[field::shift].template load<U>(lanes.at);
         const auto take = [&](U& before, U& later, Vec3<U> force) {
             before -= select(mine, quantized(mass * (half_dt * dot(force, m.u)), magic), zero);
             later -= select(mine, quantized(mass * (half_next * dot(force, coming)), magic), zero);
@@ -317,7 +317,7 @@ private:
         Sym3<U> rate{};
         if constexpr (M::diffusive) rate = diffusion(in, sums, sigma, soil, lanes);
         if constexpr (M::shifts)
-            if (Below::shifting() && in.shifts) {
+            if (in.shifts) {
                 const Vec3<U> shift = std::as_const(p)[field::shift].template load<U>(lanes.at);
                 rate = rate + U(scale_) * (sums.carried - dot(shift, sums.grad_one) * sigma);
             }

@@ -39,7 +39,7 @@ struct StepInput {
     double next;       // length of the step to come, s
     StepForces forces;
     bool evolving = false; // a soil's cone changes with strain or its rate
-    /// Where particles are shifted: this step decides how those of the next are; its own move has shifted them.
+    /// Of a model that shifts particles: this step decides how those of the next are; its own move has shifted them.
     bool shifts = false, shifted = false;
     bool remembering = false; // a soil remembers opened volume: `particles` has field::opened_volume
     Vector frame{};           // m/s, how fast the whole scene flies past; largest speeds and displacements are against it

@@ -183,7 +183,7 @@ public:
         auto& p = *in.particles;
         const Index n = p.size();
         const U dt(in.dt), half_dt = U(0.5) * dt;
-        const bool shifted = shifting() && in.shifted;
+        const bool shifted = in.shifted;
         const auto x = p[field::position], v = p[field::velocity];
         const auto a = std::as_const(p)[field::acceleration];
         const auto rho = std::as_const(p)[field::density];
@@ -237,7 +237,7 @@ protected:
     KUZURE_INLINE Vec3<V> shift_of(const StepInput& in, const Cluster<V>& i, bool counts) const
     {
         const V none(T(0));
-        if (!shifting() || !counts) return {none, none, none};
+        if (!counts) return {none, none, none};
         const auto s = std::as_const(*in.particles)[field::shift];
         const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
         return {narrow(0), narrow(1), narrow(2)};

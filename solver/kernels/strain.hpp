@@ -38,7 +38,7 @@ protected:
     {
         return {"strain", sizeof(Kinematics<T>) + (Below::shifting() ? sizeof(ShiftOf<T>) : 0),
                 39 + (M::viscous ? 12.0 : 0.0) + VelocityGradient::flops + Viscous::flops + M::CorrectionTerm::flops +
-                    M::ShiftingTerm::flops,
+                    (Below::shifting() ? M::ShiftingTerm::flops / Shifting::every : 0),
                 262, 23 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
     PassResult run_strain(const StepInput& in, std::span<const Index> clusters)
@@ -58,7 +58,7 @@ private:
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
         const auto near = Below::near(i, in, cluster, kinematics_.data());
         StrainSums<Wide> sums;
-        if (Below::shifting() && (in.shifts || in.shifted)) sum_strain<M::shifts>(in, i, near, sums);
+        if (in.shifts || in.shifted) sum_strain<M::shifts>(in, i, near, sums);
         else sum_strain<false>(in, i, near, sums);
         StrainWalls<Wide> walls{};
         const auto runs = in.lists->walls(cluster);
@@ -274,7 +274,7 @@ private:
         const Sym3<U> D = symmetric_part(L);
         if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
         Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
-        if (M::diffusive || (Below::shifting() && in.shifted)) diffusion = was[field::stress_rate].template load<U>(lanes.at);
+        if (M::diffusive || in.shifted) diffusion = was[field::stress_rate].template load<U>(lanes.at);
         // half before the turn and half after: second order in time, and exact in energy
         const Sym3<U> strain = dt * D;
         const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
@@ -283,7 +283,7 @@ private:
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
-        if (Below::shifting()) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
+        if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
 
         keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         write_stresses(in, lanes, soil, next);
@@ -339,8 +339,7 @@ private:
         const U stored = half * (compliance(s.after, s.after, soil.law) - compliance(s.before, s.before, soil.law));
         const U worked = quantized(volume * (contract(mean, dt * s.D) + diffused - stored), magic);
         tally.energy.plastic += select(mine, worked, zero);
-        if (M::diffusive || (Below::shifting() && in.shifted))
-            tally.energy.stabilising -= select(mine, quantized(volume * diffused, magic), zero);
+        if (M::diffusive || in.shifted) tally.energy.stabilising -= select(mine, quantized(volume * diffused, magic), zero);
         if (walled) {
             const U taken = quantized(volume * contract(mean, dt * symmetric_part(s.at_walls)), magic);
             tally.energy.wall -= select(mine, taken, zero);

@@ -290,7 +290,7 @@ Vector Simulation::frame(double time) const
 StepInput Simulation::step_input(double dt, double next)
 {
     // Shifted is the move of steps 4, 8, ... and decided by the step before; once more where forces are made anew in between.
-    const bool shifted = clock_.step > 0 && clock_.step % Shifting::every == 0;
+    const bool shifts = scene_.accuracy.shifting > 0, shifted = shifts && clock_.step > 0 && clock_.step % Shifting::every == 0;
     StepInput in{.particles = &particles_,
                  .lists = &layout_.lists(),
                  .soils = soils_,
@@ -299,7 +299,7 @@ StepInput Simulation::step_input(double dt, double next)
                  .next = next > 0 ? next : dt, // a run's last forces work as if it went on
                  .forces = {scene_.effects.gravity.value_or(Vector{}), damping()},
                  .evolving = evolving_,
-                 .shifts = dt > 0 ? (clock_.step + 1) % Shifting::every == 0 : shifted,
+                 .shifts = dt > 0 ? shifts && (clock_.step + 1) % Shifting::every == 0 : shifted,
                  .shifted = dt > 0 && shifted,
                  .remembering = remembering_,
                  .energy_unit = clock_.energy_unit,

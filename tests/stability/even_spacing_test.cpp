@@ -38,7 +38,68 @@ Fallen fall(double constant, const std::string& more = "", bool resting = false)
     return f;
 }
 
+/// A block that yields as it meets the floor, with everything that shifts and corrects, as x -> x turned and moved on sees it, and seen
+/// from there again: its particles' places after five shifts, in a fixed order.
+std::vector<Vector> thrown(Vector x_axis, Vector y_axis, Vector moved, double cut,
+                           const std::string& accuracy = "shifting = 2.0\ncorrection = \"adjoint\"")
+{
+    constexpr double dx = 0.04;
+    const auto to = [&](Vector a) { return a.x * x_axis + a.y * y_axis + Vector{0, 0, a.z}; };
+    const auto placed = [&](const char* what, Vector low, Vector high, const std::string& more) {
+        const Vector a = to(dx * low) + moved, b = to(dx * high) + moved;
+        return box(what, {std::min(a.x, b.x), std::min(a.y, b.y), a.z}, {std::max(a.x, b.x), std::max(a.y, b.y), b.z}, more);
+    };
+    SceneText t;
+    t.dimensions = 3, t.spacing = dx, t.end = 0.05;
+    t.effects = weight + mild, t.strength = "friction_angle = 25.0\ncohesion = 200.0";
+    const Vector v = to({1.0, 0.6, -2.0});
+    const std::string soil = fmt::format("soil = \"s\"\nvelocity = [{}, {}, {}]", v.x, v.y, v.z);
+    t.bodies = placed("body", {0, 0, 0}, {cut, 5, 6}, soil) + placed("body", {cut, 0, 0}, {7, 5, 6}, soil);
+    t.walls = placed("wall", {-12, -12, -4}, {20, 20, 0}, "");
+    t = t.with_default_kernel();
+    t.accuracy = accuracy;
+    t.time = "step = 1.0e-3";
+    Simulation sim(Comm::world(), t.scene());
+    run_to(sim, t.end);
+    double plastic = 0;
+    std::vector<Vector> all;
+    each(sim, [&](Index i) {
+        const Vector x = position(sim, i) - moved;
+        all.push_back({dot(x, x_axis), dot(x, y_axis), x.z});
+        plastic = std::max(plastic, sim.particles()[field::plastic_strain][i]);
+    });
+    EXPECT_GT(plastic, 0.05);
+    return all;
+}
+/// The farthest that a place of one lies from the nearest of the other, m.
+double apart(const std::vector<Vector>& a, const std::vector<Vector>& b)
+{
+    double most = 0;
+    for (const Vector x : a) {
+        double least = 1e300;
+        for (const Vector y : b) least = std::min(least, length(x - y));
+        most = std::max(most, least);
+    }
+    return most;
+}
+
 } // namespace
+
+TEST(EvenSpacing, IsTheSameHoweverTheSceneIsDrawn)
+{
+    const auto as_drawn = thrown({1, 0, 0}, {0, 1, 0}, {}, 3);
+    Case c("even-spacing");
+    const auto same = [&](const char* how, const std::vector<Vector>& other) {
+        EXPECT_TRUE(c.at_most(fmt::format("shifted and corrected, {}: places", how), apart(as_drawn, other), "m", 1e-10));
+    };
+    same("mirrored", thrown({-1, 0, 0}, {0, 1, 0}, {}, 3));
+    same("turned", thrown({0, 1, 0}, {-1, 0, 0}, {}, 3));
+    same("moved on", thrown({1, 0, 0}, {0, 1, 0}, {4, -8, 2}, 3));
+    same("cut elsewhere", thrown({1, 0, 0}, {0, 1, 0}, {}, 5));
+    // the controls: without the one, without the other
+    EXPECT_GT(apart(as_drawn, thrown({1, 0, 0}, {0, 1, 0}, {}, 3, "correction = \"adjoint\"")), 1e-6);
+    EXPECT_GT(apart(as_drawn, thrown({1, 0, 0}, {0, 1, 0}, {}, 3, "shifting = 2.0")), 1e-6);
+}
 
 TEST(EvenSpacing, OfSoilThatFlows)
 {

@@ -86,7 +86,6 @@ public:
     std::vector<Worked> run(int stage, double dt, double next, double energy_unit)
     {
         StepInput in = cloud_.input(dt);
-        in.shifts = in.shifted = true;
         const auto loads = loads_now(cloud_.scene);
         in.next = next, in.energy_unit = energy_unit, in.forces.damping = damping_, in.loads = loads;
         std::vector<Worked> worked;

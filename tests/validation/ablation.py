@@ -2,11 +2,12 @@
 """What each effect costs and what it changes: every effect is switched on or off alone, on three small scenes.
 
 column: aluminium bars, 4 mm (V-EXP-1); block: cohesive, 80 mm (V-EXP-5); slope: at rest at SRF 1, H/dx 20 (V-EXP-4).
-Cost: shortened runs, interleaved without, with, without, with, ...; the ratio of the least seconds_per_step, which other jobs disturb least.
+Cost: shortened runs, interleaved without, with, without, with, ...; the ratio of the medians of seconds_per_step.
 Change: one full run each. Effects whose keys this build refuses are skipped with a note.
 """
 import hashlib
 import os
+import statistics
 import sys
 
 import numpy as np
@@ -93,7 +94,7 @@ def compare(case, effect, scene_name, without, having, measure):
     for k in range(REPEATS):
         for which, scene in (("without", without), ("with", having)):
             times[which].append(seconds_per_step(scene, f"time-{tag}-{which}"))
-    cost = 100 * (min(times["with"]) / min(times["without"]) - 1)
+    cost = 100 * (statistics.median(times["with"]) / statistics.median(times["without"]) - 1)
     (off, why_off), (on, why_on) = answers(without, measure, scene_name), answers(having, measure, scene_name)
     parts = [f"{k} {off.get(k, np.nan):.4g} without, {on.get(k, np.nan):.4g} with" for k in dict(off, **on)] + [
         w for w in (why_off, why_on) if w

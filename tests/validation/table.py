@@ -39,7 +39,7 @@ The first criterion tried, "moved more than 0.05 H", is in the notes: slopes tha
     "V-EXP-5": """A cohesive block whose crest is torn: tensile instability.
 Clumps are neighbours closer than 0.6 spacings.
 The gates are on the kernel of the defaults; those of the cubic spline, for which they were first written, stand beside.""",
-    "ablation": """Cost of a step: interleaved shortened runs, with over without, ratio of the fastest of five each.
+    "ablation": """Cost of a step: interleaved shortened runs, with over without, ratio of the medians of five each.
 Measured while other jobs ran on the same two cores: below about 10 % it is noise.
 The answers come from one full run each.
 Stress noise: RMS of the vertical stress against its neighbourhood's average.
