@@ -40,7 +40,7 @@ The first criterion tried, "moved more than 0.05 H", is in the notes: slopes tha
 Clumps are neighbours closer than 0.6 spacings.
 The gates are on the kernel of the defaults; those of the cubic spline, for which they were first written, stand beside.""",
     "ablation": """Cost of a step: interleaved shortened runs, with over without, ratio of the medians of five each.
-Measured while other jobs ran on the same two cores: below about 10 % it is noise.
+Measured on a quiet machine: below about 5 % it is noise.
 The answers come from one full run each.
 Stress noise: RMS of the vertical stress against its neighbourhood's average.
 What it teaches: artificial stress is paid for and changes nothing in dry soil; stress diffusion takes the noise out of level ground but pushes a slope that stands (its static part is that of level ground), so "auto" leaves it off there and check warns of it.""",
