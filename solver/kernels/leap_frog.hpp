@@ -371,7 +371,7 @@ private:
             if (model_.correct) {
                 const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
                 const Sym3<U> correction =
-                    GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - load<U>(share.walled + lanes.first));
+                    GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - load<U>(share.walled + lanes.first)).K;
                 r.L = {correction * r.L.x, correction * r.L.y, correction * r.L.z};
             }
         const auto material = [&](int k) -> const Material& {

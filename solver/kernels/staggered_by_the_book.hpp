@@ -231,6 +231,7 @@ struct Strain {
     Matrix K{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; // correction of gradients
     Vector crowd{};                            // grad C of near neighbours, 1/m
     double inside = 0;                         // tr M/d, walls among the neighbours
+    double sees_all = 0;                       // 1 where L has all of an affine motion, in part 0 near surfaces
 };
 /// 0.2 (W/W(spacing))^4: near neighbours count. Lind et al. (2012), eq. 26.
 inline double crowding(const Kernel& kernel, double spacing, double r)
@@ -292,6 +293,9 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction != scene::Correction::None && !of_i.beside_wall)
         of_i.L = corrected(of_i.L, M, s.how.dimensions), of_i.K = corrected(of_i.K, M, s.how.dimensions);
+    of_i.sees_all = s.how.correction != scene::Correction::None && !of_i.beside_wall && trusted(M, s.how.dimensions)
+                        ? 1
+                        : std::clamp((trace(M) / s.how.dimensions - 0.75) / 0.15, 0.0, 1.0);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
     of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;
@@ -305,6 +309,7 @@ struct Strained {
     double density, plastic_strain, opened;
     double plastic, stabilising, wall;
     Vector shift{}, shift_acceleration{}; // m/s, m/s^2
+    double weight = 0;                    // in the hourglass control, kg/(m^2 s)
 };
 inline Strained strained(const Particle& i, const Material& soil, const Kept& kept, const Strain& strain, const Setting& s, double dt)
 {
@@ -315,6 +320,7 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
             evolved(law, Evolution<double>::from(soil, s.how.h), kept.plastic_strain, std::sqrt(4 * J2(deviator(D))), -trace(i.stress) / 3);
     const Stress loading = (dt / 2) * (hooke(D, law) + kept.stress_rate);
     const auto mapped = return_to_cone(rotate(spin_increment(strain.L, dt), i.stress + loading) + loading, law, kept.opened);
+    const bool holds = mapped.d_lambda <= 0 && mapped.opened <= 0;
     // d rho/dt = -rho tr L: (rho' - rho)/dt = -tr L (rho' + rho)/2
     const double change = dt / 2 * trace(strain.L);
     Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.d_lambda, mapped.opened, 0, 0, 0};
@@ -326,6 +332,7 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
     next.plastic = volume * (dt * kuzure::contract(mean, D) + diffused - stored);
     next.stabilising = -volume * diffused;
     next.wall = -volume * dt * contract(mean, strain.L_walls);
+    next.weight = holds ? strain.sees_all * (dt > 0 ? next.density : i.density) * soil.c_p : 0;
     if (s.how.shifting == 0) return next;
     // The way beside the velocity changes the potential energy.
     const Vector weight = s.how.effects.gravity.value_or(Vector{}) + (-1 / soil.density) * PoreWater::from(s.how.effects).at(i.x).gradient;
@@ -351,10 +358,23 @@ struct Forced {
     enum class Contact { None, Presses, Approached, LetGo } contact = Contact::None; // with Coulomb faces
     enum class Rubs { Not, Sticks, Slides } rubs = Rubs::Not;
 };
-/// `K`: corrections of pair forces; none: they are not corrected. `kept.acceleration` is the viscous one of this step; dt is its length,
-/// `next` that of the one to come, s.
-inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const Matrix> K, std::span<const GroundPoint> points,
-                       const Setting& s, double dt, double next)
+/// What the hourglass control knows of a particle: its velocity gradient, 1/s, and its weight.
+struct Affine {
+    Matrix L;
+    double weight;
+};
+/// Against the part of v_ij that neither velocity gradient tells of: 2 xi h min(w_i, w_j) V_j (v_ij - (L_i + L_j) x_ij/2)
+/// (x_ij . grad W)/(r^2 + 0.01 h^2), N/m^3. Zhang et al. (2024).
+inline Vector hourglass_force(double xi, double h, const Particle& i, const Particle& j, const Affine& of_i, const Affine& of_j,
+                              Vector grad)
+{
+    const Vector x_ij = i.x - j.x, apart = (i.v - j.v) - 0.5 * ((of_i.L + of_j.L) * x_ij);
+    return (2 * xi * h * std::min(of_i.weight, of_j.weight) * j.volume * dot(x_ij, grad) / (dot(x_ij, x_ij) + 0.01 * h * h)) * apart;
+}
+/// `K`: corrections of pair forces; none: they are not corrected. `affine` as K. `kept.acceleration` is the viscous one of this step; dt is
+/// its length, `next` that of the one to come, s.
+inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const Matrix> K, std::span<const Affine> affine,
+                       std::span<const GroundPoint> points, const Setting& s, double dt, double next)
 {
     const Kernel kernel = s.kernel();
     const scene::Effects& e = s.how.effects;
@@ -384,6 +404,7 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         stress = stress + j.volume * (K.empty() ? (i.stress + j.stress) * grad : i.stress * (K[k] * grad) + j.stress * (K[l] * grad));
         inward = inward + 2 * j.volume * grad;
         if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
+        if (s.how.hourglass > 0) art = art + hourglass_force(s.how.hourglass, s.how.h, i, j, affine[k], affine[l], grad);
         if (e.stress_diffusion)
             of_i.stress_rate = of_i.stress_rate + stress_diffusion(e.stress_diffusion->zeta, s.how.h, gravity, material, i, j, grad);
         if (s.how.shifting > 0) of_i.stress_rate = of_i.stress_rate + (j.volume * dot(kept.shift, grad)) * (j.stress - i.stress);

@@ -3,6 +3,7 @@
 // force, which waits in the acceleration's column for the force stage.
 #include "solver/kernels/staggered_records.hpp"
 #include "solver/walls/friction.hpp"
+#include <algorithm>
 
 namespace kuzure {
 
@@ -53,6 +54,7 @@ private:
         Cluster<V> i = Below::cluster_at(in, cluster, tally);
         if (i.moving == 0) { // its list is pruned when it wakes
             if (in.prune) in.lists->pruned(cluster).n = -1;
+            if (Below::controls()) std::fill_n(&Below::affine_[i.first], i.count, Affine<T>{});
             return;
         }
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
@@ -256,13 +258,17 @@ private:
             }
             friction_lags(in, lanes, rubbing, soil.c);
         }
-        if constexpr (M::corrected)
+        U sees_all = zero; // of the hourglass control: 1 where L has all of an affine motion
+        if constexpr (M::corrected) {
+            const Sym3<U> moment = U(-unit_) * factor * sums.moment; // the sums hold r = x_i - x_j in `unit`
+            if (Below::controls()) sees_all = Shifting::inside(U(1.0 / dimensions_) * trace(moment));
             if (model_.correct) {
-                const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
-                const Sym3<U> correction = GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - feels_wall);
+                const auto [correction, trusted] = GradientCorrection::inverse(moment, dimensions_, one - feels_wall);
+                sees_all = max(sees_all, trusted);
                 L = {correction * L.x, correction * L.y, correction * L.z};
                 if (model_.adjoint) keep_correction(in, lanes, correction);
             }
+        }
         if (walled) {
             // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy
             // in first order of dt
@@ -283,6 +289,10 @@ private:
         // drho/dt = -rho tr L, by the midpoint rule
         const U change = half_dt * trace(L);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
+        if (Below::controls()) {
+            const U yields = mapped.d_lambda + mapped.opened, holds = select(less(zero, yields), zero, one);
+            write_affine(in, lanes, L, holds * sees_all * next.rho * soil.c);
+        }
         if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
 
         keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
@@ -374,6 +384,18 @@ private:
         const U was = std::as_const(*in.particles)[field::wall_friction].template load<U>(lanes.at);
         const U next = fma(of.keep, was, of.take * rubbing);
         limit.store(lanes.at, in.sleep == SleepStage::Frozen ? select(written<U>(lanes), next, was) : next, lanes.n);
+    }
+    /// What the force stage's hourglass control reads; sleepers have none.
+    KUZURE_INLINE void write_affine(const StepInput& in, const Lanes& lanes, const Mat3<U>& L, U weight)
+    {
+        if (in.sleep == SleepStage::Frozen) weight = select(written<U>(lanes), weight, U(0.0));
+        double fields[10][width<U>];
+        const U columns[10] = {L.x.x, L.x.y, L.x.z, L.y.x, L.y.y, L.y.z, L.z.x, L.z.y, L.z.z, weight};
+        for (int k = 0; k < 10; ++k) store(fields[k], columns[k]);
+        for (int k = 0; k < lanes.n; ++k) {
+            const auto at = [&](int c) { return T(fields[c][k]); };
+            Below::affine_[lanes.at + k] = {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), {}};
+        }
     }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
     {

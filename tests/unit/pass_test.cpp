@@ -114,14 +114,16 @@ TEST(Pass, LanesGiveThePlainLoopsBits)
 
 TEST(Pass, LanesGiveThePlainLoopsBitsOfShiftedAndCorrectedSteps)
 {
-    const auto staggered = [](Scene s, double shifting, scene::Correction correction) {
-        s.accuracy.scheme = scene::Scheme::Staggered, s.accuracy.shifting = shifting, s.accuracy.correction = correction;
+    const auto staggered = [](Scene s, double shifting, scene::Correction correction, double hourglass = 0) {
+        s.accuracy.scheme = scene::Scheme::Staggered, s.accuracy.shifting = shifting, s.accuracy.correction = correction,
+        s.accuracy.hourglass = hourglass;
         return s;
     };
     using scene::Kernel, scene::Correction;
     for (const Scene& s : {staggered(with(Kernel::WendlandC2, true, 0, false), 2, Correction::None),
                            staggered(with(Kernel::WendlandC2, true, 0, false), 0, Correction::Adjoint),
-                           staggered(refined(with(Kernel::CubicSpline, true, 0.5, true), true, true), 2, Correction::Adjoint),
+                           staggered(refined(with(Kernel::CubicSpline, true, 0.5, true), true, true), 2, Correction::Adjoint, 0.1),
+                           staggered(with(Kernel::WendlandC2, true, 0, false), 0, Correction::None, 0.2),
                            staggered(refined(with(Kernel::WendlandC4, true, 0.2, true, 2), true, true), 2, Correction::Adjoint)})
         for (int kind = 0; kind < 4; ++kind) {
             Cloud plain = arrangement(kind, s), lanes = arrangement(kind, s);
