@@ -145,7 +145,7 @@ private:
                     const V t = max(support - inv.root, zero);
                     const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * records[number].volume;
                     e.grad = w * r;
-                    if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                    if constexpr (M::tensile) e.t = t;
                     if constexpr (M::corrected) e.r = r;
                     if constexpr (M::corrected && !M::diffusive)
                         if (controls) e.q = w * (r2 / (r2 + softening));
@@ -155,12 +155,13 @@ private:
                         e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
                     }
                 }
-                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
+                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f (tau_i + tau_j) ] . grad W
                 if (adjoint) CorrectedForce{}.add(sums, batch, Below::tractions_.data());
                 else
                     StressForce{}.add(
                         sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
-                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+                if constexpr (M::tensile)
+                    model_.artificial_stress.add(sums, batch, tension_.data(), tension, model_.artificial_stress.mean);
                 if constexpr (M::corrected)
                     if (controls) model_.hourglass.add(sums, batch, Below::affine_.data(), neighbours, velocity, weight, V(T(0.5 * unit_)));
                 if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
@@ -234,14 +235,14 @@ private:
 
         Vec3<U> own = sums.grad_one;
         if (Below::adjoint()) own = was[field::gradient_matrix].template load<U>(lanes.at) * own;
-        const Vec3<U> stress = per_rho * (sums.force + sigma * own);
+        Vec3<U> stress = per_rho * (sums.force + sigma * own);
         Vec3<U> artificial{zero, zero, zero}, wall = artificial, by_loads = artificial;
         if constexpr (M::tensile) {
             const auto tau = lane_by_lane<Sym3, U>([&](int k) {
                 const Tension<T>& t = tension_[lanes.particle(k)];
                 return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
             });
-            artificial = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
+            stress = stress + per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
         if constexpr (M::corrected)

@@ -26,12 +26,13 @@ struct Model {
     using ShiftingTerm = Shifted;
     static constexpr bool viscous = !std::is_same_v<Viscous, NoViscosity>;
     static constexpr bool tensile = std::is_same_v<Tensile, ArtificialStress>;
+    using TensionTerm = std::conditional_t<tensile, StrainOfTension, NoStrainOfTension>;
     static constexpr bool diffusive = std::is_same_v<Diffusive, StressDiffusion>;
     static constexpr bool corrected = std::is_same_v<Corrected, GradientCorrection>;
     static constexpr bool shifts = std::is_same_v<Shifted, Shifting>;
     using HourglassTerm = std::conditional_t<corrected, HourglassControl, NoHourglass>;
     using CarriedTerm = std::conditional_t<shifts, CarriedStress, NothingCarried>;
-    static constexpr bool pushes = tensile || shifts || corrected || sizeof...(More) > 0;
+    static constexpr bool pushes = shifts || corrected || sizeof...(More) > 0;
     static constexpr double more_flops = (0.0 + ... + More::flops);
     template <class S, class... Terms> using WithMore = SumsOf<S, Terms..., More...>;
     Kernel kernel;
@@ -50,7 +51,7 @@ struct Model {
         const Kernel kernel(s.h / unit, s.dimensions);
         return {kernel,
                 Viscous::from(s.effects, kernel.h),
-                Tensile::from(s.effects, kernel, s.spacing / unit),
+                Tensile::from(s.effects, kernel, s.spacing / unit, s.dimensions),
                 Diffusive::from(s.effects),
                 {},
                 s.correction != scene::Correction::None,

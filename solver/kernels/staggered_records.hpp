@@ -86,7 +86,7 @@ public:
             kinematics_[i] = {fixed_(x.x), fixed_(x.y), fixed_(x.z), T(v.x), T(v.y), T(v.z), T(volume), T(rho)};
             const bool awake = sleepy && p[field::activity][i] == std::int32_t(Activity::Moves);
             stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
-            if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
+            if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.adjoint_epsilon);
             if (shifting()) shifts_[i] = shift_of(p[field::shift][i]);
             if (adjoint()) tractions_[i] = make_traction<T>(s, p[field::gradient_matrix][i]);
         }

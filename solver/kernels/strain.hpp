@@ -28,7 +28,8 @@ protected:
     template <class S> struct ViscousPower {
         S now, next;
     };
-    template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm, typename M::ShiftingTerm>;
+    template <class S>
+    using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm, typename M::ShiftingTerm, typename M::TensionTerm>;
     using Wide = WideLanes<W>;
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
@@ -99,6 +100,7 @@ private:
         [[maybe_unused]] const bool shifted = in.shifted, decides = in.shifts;
         const ShiftOf<T>* shifts = Below::shifts_.data();
         const Vec3<V> own = Below::shift_of(in, i, in.shifted);
+        const bool tension = Below::in_tension(i, tension_);
         Batch<V> batch;
         StrainSums<V> sums{};
         Below::for_each_batch(
@@ -125,12 +127,15 @@ private:
                         e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
                     }
                     if constexpr (M::corrected || shifting) e.r = r;
+                    if constexpr (M::tensile) e.t = t;
                     if constexpr (shifting)
                         if (decides) e.w = model_.kernel.value(t);
                 }
                 VelocityGradient{}.add(sums, batch);
                 Viscous{}.add(sums, batch);
                 if constexpr (M::corrected) model_.correction.add(sums, batch);
+                if constexpr (M::tensile)
+                    if (tension) StrainOfTension{}.add(sums, batch, model_.artificial_stress);
                 if constexpr (shifting)
                     if (decides) model_.shifting.add(sums, batch);
             });
@@ -277,7 +282,8 @@ private:
         }
         L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
 
-        const Sym3<U> D = symmetric_part(L);
+        Sym3<U> D = symmetric_part(L);
+        if constexpr (M::tensile) D = D - less_in_tension(sums, sigma + hooke(half_dt * D, soil.law), lanes); // of mid-step
         if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
         Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
         if (M::diffusive || in.shifted) diffusion = was[field::stress_rate].template load<U>(lanes.at);
@@ -299,6 +305,16 @@ private:
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
+    }
+    /// epsilon N [sum_j V_j f (v_j - v_i) (x) grad W] N: what the strain of soil in tension is less by.
+    KUZURE_INLINE Sym3<U> less_in_tension(const StrainSums<U>& sums, const Sym3<U>& sigma, const Lanes& lanes) const
+    {
+        const Sym3<U> near = U(model_.artificial_stress.adjoint_epsilon * scale_) * symmetric_part(sums.near_grad_v);
+        const auto at = [](const Sym3<U>& s, int k) {
+            return Stress{lane(s.xx, k), lane(s.yy, k), lane(s.zz, k), lane(s.xy, k), lane(s.yz, k), lane(s.xz, k)};
+        };
+        return lane_by_lane<Sym3, U>(
+            [&](int k) { return tension_[lanes.particle(k)].any == 0 ? Stress{} : tensile_part(at(sigma, k), at(near, k)); });
     }
     /// The way beside its velocity that a particle goes in the step to come, and what this step's has changed: its velocity, and its
     /// potential energy, which is booked here whole.
@@ -417,7 +433,7 @@ private:
             if constexpr (M::tensile)
                 tension_[lanes.at + k] =
                     make_tension<T>(Stress{fields[0][k], fields[1][k], fields[2][k], fields[3][k], fields[4][k], fields[5][k]},
-                                    model_.artificial_stress.epsilon);
+                                    model_.artificial_stress.adjoint_epsilon);
         }
     }
 };

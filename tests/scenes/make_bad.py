@@ -571,10 +571,7 @@ CASES = {
         acc('scheme = "leap-frog"\nhourglass = 0.1'),
         r'accuracy\.hourglass: expected 0, found 0\.1: the leap-frog scheme has no hourglass control\. Remedy: accuracy\.scheme = "staggered"',
     ),
-    "hourglass_too_strong": (
-        acc("hourglass = 0.5"),
-        r"accuracy\.cfl: expected a number below the stable limit",
-    ),
+    "hourglass_too_strong": (acc("hourglass = 0.5"), r"accuracy\.cfl: expected a number below the stable limit"),
     "kernel_norm_misspelt": (
         acc('kernel_norm = "grid"'),
         r':22: accuracy\.kernel_norm: expected one of "lattice", "continuum", found "grid"',
