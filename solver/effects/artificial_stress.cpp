@@ -81,9 +81,9 @@ Stress tensile_part(const Stress& sigma, const Stress& a)
     for (int k = 0; k < 3; ++k) t[k] = of.value[k] > 0;
     const Stress N = composed(of, t);
     const Vector x = N * Vector{a.xx, a.xy, a.xz}, y = N * Vector{a.xy, a.yy, a.yz}, z = N * Vector{a.xz, a.yz, a.zz}; // columns of N a
-    // (N a) N, row by row
-    const Vector row_x = N * Vector{x.x, y.x, z.x}, row_y = N * Vector{x.y, y.y, z.y}, row_z = N * Vector{x.z, y.z, z.z};
-    return {row_x.x, row_y.y, row_z.z, row_x.y, row_y.z, row_x.z};
+    // (N a) N
+    const Vector along_x = N * Vector{x.x, y.x, z.x}, along_y = N * Vector{x.y, y.y, z.y}, along_z = N * Vector{x.z, y.z, z.z};
+    return {along_x.x, along_y.y, along_z.z, along_x.y, along_y.z, along_x.z};
 }
 
 template <class T> Tension<T> make_tension(const Stress& s, double epsilon)

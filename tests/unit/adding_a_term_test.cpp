@@ -56,6 +56,7 @@ TEST(AddingATerm, ItsForceIsAddedToTheOthers)
     c.step(model, c.input(1e-4));
     const auto& q = c.particles;
     const CubicSpline W(c.scene.smoothing_length(), 3);
+    const double scale = gradient_norm<CubicSpline>(c.scene.accuracy.kernel_norm, 3, c.scene.space.h) * W.scale;
     double worst = 0, largest = 0;
     for (Index i = 0; i < q.size(); ++i) {
         Vector sum{};
@@ -64,7 +65,7 @@ TEST(AddingATerm, ItsForceIsAddedToTheOthers)
             const double distance = length(r);
             if (i == j || distance >= 2 * W.h) continue;
             const double volume = c.scene.particle_volume() * c.soils[0].density / q[field::density][j];
-            sum = sum + (volume * W.scale * W.F(2 * W.h - distance, distance, 1 / distance)) * r;
+            sum = sum + (volume * scale * W.F(2 * W.h - distance, distance, 1 / distance)) * r;
         }
         const Vector expected = (p / q[field::density][i]) * sum, found = with.a[std::size_t(i)] - without.a[std::size_t(i)];
         worst = std::max(worst, length(found - expected)), largest = std::max(largest, length(expected));

@@ -63,7 +63,7 @@ TEST(Settling, ABankStandsAndStartsFromNothing)
 // Closed form of a layer on an infinite slope, here drawn level under tilted gravity.
 TEST(Settling, ALayerUnderTiltedGravityHangsOnItsFloor)
 {
-    SceneText t;
+    SceneText t = SceneText{}.with_default_kernel();
     t.spacing = 0.1, t.density = 2000, t.young = 2e7;
     t.space = periodic(0.8, -1, 3);
     t.bodies = box("body", {0, 0, 0}, {0.8, 0, 2}, at_rest);
