@@ -97,24 +97,6 @@ private:
         const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
         return {narrow(0), narrow(1), narrow(2), narrow(3), narrow(4), narrow(5)};
     }
-    KUZURE_INLINE static Vec3<V> velocity_of(const StepInput& in, const Cluster<V>& i)
-    {
-        const auto v = std::as_const(*in.particles)[field::velocity];
-        const auto narrow = [&](int k) { return load_narrow<V>(v.column[k] + i.first); };
-        return {narrow(0), narrow(1), narrow(2)};
-    }
-    /// In the hourglass control.
-    KUZURE_INLINE V weight_of(const Cluster<V>& i) const
-    {
-        T w[W];
-        for (int k = 0; k < W; ++k) w[k] = Below::affine_[i.first + std::min(k, i.count - 1)].weight;
-        return load<V>(w);
-    }
-    KUZURE_INLINE static bool any(Vec3<V> a)
-    {
-        const V none(T(0)), most = max(max(abs(a.x), abs(a.y)), abs(a.z));
-        return bits(less(none, most)) != 0;
-    }
     /// Returns the pairs inside the support. Entries of the list beyond it add exact zeros.
     /// `carries`: this step shifts particles, which carry stress along.
     template <bool carries>
@@ -126,10 +108,10 @@ private:
         const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Below::in_tension(i, tension_);
         const bool adjoint = Below::adjoint(), controls = Below::controls();
-        const Vec3<V> velocity = controls ? velocity_of(in, i) : Vec3<V>{};
-        const V weight = controls ? weight_of(i) : V(T(0));
+        const Vec3<V> velocity = controls ? Below::velocity_of(in, i) : Vec3<V>{};
+        const V weight = controls ? Below::weight_of(i) : V(T(0));
         const Vec3<V> shift = Below::shift_of(in, i, carries);
-        const bool shifted = carries && any(shift);
+        const bool shifted = carries && Below::any(shift);
         Batch<V> batch;
         ForceSums<V> sums{};
         V inside = zero;
@@ -178,7 +160,7 @@ private:
     [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
                                                    const Sym3<V>& sigma, ForceWalls<Wide>& out, WallPower<Wide>* power_out) const
     {
-        const Vec3<V> velocity = velocity_of(in, i);
+        const Vec3<V> velocity = Below::velocity_of(in, i);
         ForceWalls<V> sums{};
         WallPower<V> power{};
         sums.nearest = Below::lengths().support2;
@@ -238,15 +220,11 @@ private:
         Vec3<U> stress = per_rho * (sums.force + sigma * own);
         Vec3<U> artificial{zero, zero, zero}, wall = artificial, by_loads = artificial;
         if constexpr (M::tensile) {
-            const auto tau = lane_by_lane<Sym3, U>([&](int k) {
-                const Tension<T>& t = tension_[lanes.particle(k)];
-                return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
-            });
-            stress = stress + per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
+            stress = stress + per_rho * (Below::artificial_stress_of(lanes) * sums.closeness_grad + sums.art_stress_j);
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
         if constexpr (M::corrected)
-            if (Below::controls()) artificial = artificial + per_rho * hourglass(sums, lanes);
+            if (Below::controls()) artificial = artificial + per_rho * Below::hourglass(sums, lanes);
         if (M::diffusive || in.shifts) rate_of_stress(in, sums, sigma, soil, lanes);
         if (in.shifted) artificial = artificial + was[field::shift_acceleration].template load<U>(lanes.at);
         if (walled) {
@@ -348,17 +326,6 @@ private:
         const auto kept = p[field::stress_rate];
         if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
         kept.store(lanes.at, rate, lanes.n);
-    }
-    /// Force of the hourglass control, Pa/m without the kernel's constant.
-    KUZURE_INLINE Vec3<U> hourglass(const ForceSums<U>& sums, const Lanes& lanes) const
-    {
-        const auto of = [&](auto read) { return lane_by_lane<U>([&](int k) { return double(read(Below::affine_[lanes.particle(k)])); }); };
-        using A = const Affine<T>&;
-        const Vec3<U> half = U(0.5 * unit_) * sums.arm;
-        const Vec3<U> x{of([](A a) { return a.xx; }), of([](A a) { return a.xy; }), of([](A a) { return a.xz; })};
-        const Vec3<U> y{of([](A a) { return a.yx; }), of([](A a) { return a.yy; }), of([](A a) { return a.yz; })};
-        const Vec3<U> z{of([](A a) { return a.zx; }), of([](A a) { return a.zy; }), of([](A a) { return a.zz; })};
-        return U(2 * model_.hourglass.strength * h_ / unit_) * (sums.apart - Vec3<U>{dot(x, half), dot(y, half), dot(z, half)});
     }
     KUZURE_INLINE Sym3<U> diffusion(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
                                     const Lanes& lanes) const

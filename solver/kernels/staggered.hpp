@@ -10,13 +10,15 @@
 // neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice. The work of a force between t^n and t^{n+1} is (F^n + F^{n+1})/2 . v^{n+1/2} dt: the half of F^n that comes after
 // t^n is booked as `later`, with the length of the step to come, which is decided one step ahead.
+#include "solver/kernels/affine_motion.hpp"
 #include "solver/kernels/force.hpp"
 #include "solver/kernels/strain.hpp"
 
 namespace kuzure {
 
-template <class M, class V, class Law = MirrorImage> class Staggered : public ForceStage<StrainStage<StaggeredRecords<M, V, Law>>> {
-    using Base = ForceStage<StrainStage<StaggeredRecords<M, V, Law>>>;
+template <class M, class V, class Law = MirrorImage>
+class Staggered : public ForceStage<StrainStage<AffineMotion<StaggeredRecords<M, V, Law>>>> {
+    using Base = ForceStage<StrainStage<AffineMotion<StaggeredRecords<M, V, Law>>>>;
 
 public:
     explicit Staggered(const scene::Interactions& s) : Base(s), stages_{Base::strain_stage(), Base::force_stage()} {}

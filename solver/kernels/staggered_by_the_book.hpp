@@ -268,6 +268,16 @@ struct NearTension {
         return std::pow(kernel.value(r) / kernel.value(spacing), exponent) - mean;
     }
 };
+/// Corrects L of the soil where the scene says so, and says how much of an affine motion L then has.
+inline void correct(Strain& of_i, const Matrix& M, const Setting& s)
+{
+    // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
+    if (s.how.correction != scene::Correction::None && !of_i.beside_wall)
+        of_i.L = corrected(of_i.L, M, s.how.dimensions), of_i.K = corrected(of_i.K, M, s.how.dimensions);
+    of_i.sees_all = s.how.correction != scene::Correction::None && !of_i.beside_wall && trusted(M, s.how.dimensions)
+                        ? 1
+                        : std::clamp((trace(M) / s.how.dimensions - 0.75) / 0.15, 0.0, 1.0);
+}
 inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> kept, std::span<const GroundPoint> points, const Setting& s,
                         double dt)
 {
@@ -287,13 +297,12 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     for (std::size_t l = 0; l < soil.x.size(); ++l) {
         if (l == k) continue;
         const Particle j = at_mid_step(particle(soil, l, s), kept[l].shift);
-        const Vector grad = kernel.gradient(here.x - j.x);
+        const Vector x_ij = here.x - j.x, grad = kernel.gradient(x_ij);
         of_i.L = of_i.L + j.volume * outer(j.v - i.v, grad);
         M = M + j.volume * outer(j.x - here.x, grad);
-        if (near.epsilon > 0)
-            of_i.near_tension =
-                of_i.near_tension + j.volume * near.f(kernel, s.how.spacing, length(here.x - j.x)) * symmetric_part(outer(j.v - i.v, grad));
-        of_i.crowd = of_i.crowd + (j.volume * crowding(kernel, s.how.spacing, length(here.x - j.x))) * grad;
+        const Stress strained = j.volume * symmetric_part(outer(j.v - i.v, grad));
+        if (near.epsilon > 0) of_i.near_tension = of_i.near_tension + near.f(kernel, s.how.spacing, length(x_ij)) * strained;
+        of_i.crowd = of_i.crowd + (j.volume * crowding(kernel, s.how.spacing, length(x_ij))) * grad;
         if (viscous) pressure = pressure + (j.volume * i.density * j.density * viscosity(*viscous, s.how.h, here, j, i.v - j.v)) * grad;
     }
     of_i.inside = trace(M) / s.how.dimensions;
@@ -305,8 +314,8 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
         const Face& face = mirroring(w, r);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector mirrored = mirror * crossing(wall, face, i.v - velocity_of(w, face, s.motion)); // v_iw
-        (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) =
-            (wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls) + -i.volume * outer(mirrored, grad);
+        Matrix& L_of_it = wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls;
+        L_of_it = L_of_it + -i.volume * outer(mirrored, grad);
         of_i.beside_wall = true;
         if (!viscous) continue;
         Particle shown = i; // the wall shows i itself
@@ -324,12 +333,7 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     of_i.friction = dt > 0 ? (lag * kept[k].friction + dt * of_i.friction) / (lag + dt) : of_i.friction;
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
     if (kept[k].pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
-    // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
-    if (s.how.correction != scene::Correction::None && !of_i.beside_wall)
-        of_i.L = corrected(of_i.L, M, s.how.dimensions), of_i.K = corrected(of_i.K, M, s.how.dimensions);
-    of_i.sees_all = s.how.correction != scene::Correction::None && !of_i.beside_wall && trusted(M, s.how.dimensions)
-                        ? 1
-                        : std::clamp((trace(M) / s.how.dimensions - 0.75) / 0.15, 0.0, 1.0);
+    correct(of_i, M, s);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
     of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;

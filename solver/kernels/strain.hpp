@@ -283,7 +283,7 @@ private:
         L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
 
         Sym3<U> D = symmetric_part(L);
-        if constexpr (M::tensile) D = D - less_in_tension(sums, sigma + hooke(half_dt * D, soil.law), lanes); // of mid-step
+        if constexpr (M::tensile) D = D - Below::less_in_tension(sums, sigma + hooke(half_dt * D, soil.law), lanes); // of mid-step
         if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
         Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
         if (M::diffusive || in.shifted) diffusion = was[field::stress_rate].template load<U>(lanes.at);
@@ -297,7 +297,7 @@ private:
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
         if (Below::controls()) {
             const U yields = mapped.d_lambda + mapped.opened, holds = select(less(zero, yields), zero, one);
-            write_affine(in, lanes, L, holds * sees_all * next.rho * soil.c);
+            Below::write_affine(in, lanes, L, holds * sees_all * next.rho * soil.c);
         }
         if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
 
@@ -305,16 +305,6 @@ private:
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
-    }
-    /// epsilon N [sum_j V_j f (v_j - v_i) (x) grad W] N: what the strain of soil in tension is less by.
-    KUZURE_INLINE Sym3<U> less_in_tension(const StrainSums<U>& sums, const Sym3<U>& sigma, const Lanes& lanes) const
-    {
-        const Sym3<U> near = U(model_.artificial_stress.adjoint_epsilon * scale_) * symmetric_part(sums.near_grad_v);
-        const auto at = [](const Sym3<U>& s, int k) {
-            return Stress{lane(s.xx, k), lane(s.yy, k), lane(s.zz, k), lane(s.xy, k), lane(s.yz, k), lane(s.xz, k)};
-        };
-        return lane_by_lane<Sym3, U>(
-            [&](int k) { return tension_[lanes.particle(k)].any == 0 ? Stress{} : tensile_part(at(sigma, k), at(near, k)); });
     }
     /// The way beside its velocity that a particle goes in the step to come, and what this step's has changed: its velocity, and its
     /// potential energy, which is booked here whole.
@@ -400,18 +390,6 @@ private:
         const U was = std::as_const(*in.particles)[field::wall_friction].template load<U>(lanes.at);
         const U next = fma(of.keep, was, of.take * rubbing);
         limit.store(lanes.at, in.sleep == SleepStage::Frozen ? select(written<U>(lanes), next, was) : next, lanes.n);
-    }
-    /// What the force stage's hourglass control reads; sleepers have none.
-    KUZURE_INLINE void write_affine(const StepInput& in, const Lanes& lanes, const Mat3<U>& L, U weight)
-    {
-        if (in.sleep == SleepStage::Frozen) weight = select(written<U>(lanes), weight, U(0.0));
-        double fields[10][width<U>];
-        const U columns[10] = {L.x.x, L.x.y, L.x.z, L.y.x, L.y.y, L.y.z, L.z.x, L.z.y, L.z.z, weight};
-        for (int k = 0; k < 10; ++k) store(fields[k], columns[k]);
-        for (int k = 0; k < lanes.n; ++k) {
-            const auto at = [&](int c) { return T(fields[c][k]); };
-            Below::affine_[lanes.at + k] = {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), {}};
-        }
     }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
     {
