@@ -198,7 +198,7 @@ def other_ways():
         run(scene("excavation", EXCAVATION + STAGES), "one")
     for name, more in (
         ("leap-frog", '[accuracy]\nscheme = "leap-frog"\ncfl = 0.2\n'),
-        ("sleeping", "[accuracy]\ncfl = 0.5\nsleep_below = 0.002\n"),
+        ("sleeping", "[accuracy]\ncfl = 0.5\nsleep_below = 0.001\n"),
         ("retry", None),
     ):
         text = EXCAVATION + STAGES
