@@ -495,21 +495,23 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     }
     Vector by_walls = (1 / i.density) * held + out.push;
     double power[2] = {held_power[0] / i.density, held_power[1] / i.density};
-    // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
+    // Coulomb: the wall is felt where it presses, or where the particle comes nearer; half of it by whether the strain of this step counted
+    // it, half by whether the next one will. Friction is a spring of the soil's shear stiffness
     // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (length(area) > 0) {
         of_i.contact = limit > 0 ? Forced::Contact::Presses : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
-        const bool felt = of_i.contact != Forced::Contact::LetGo;
-        const double lag = 4 * s.how.h / material.c_p, presses = (felt ? limit / i.density : 0) + length(out.push) * out.grip;
+        const bool now = of_i.contact != Forced::Contact::LetGo, before = dt > 0 ? kept.pressed > 0 || approach > 0 : now;
+        const double felt = (before ? 0.5 : 0) + (now ? 0.5 : 0);
+        const double lag = 4 * s.how.h / material.c_p, presses = felt * limit / i.density + length(out.push) * out.grip;
         of_i.pressed = limit > 0 ? length(push) / i.density : 0;
         of_i.friction = kept.friction + (dt > 0 ? dt / (lag + dt) : 1) * presses;
-        if (felt) by_walls = by_walls + (1 / i.density) * push;
-        for (int t = 0; t < 2; ++t) power[t] += felt ? push_power[t] / i.density : 0;
+        by_walls = by_walls + (felt / i.density) * push;
+        for (int t = 0; t < 2; ++t) power[t] += felt * push_power[t] / i.density;
         if (all_faces != 0)
             for (Vector& c : carried) c = (1 / all_faces) * c; // the mean velocity of the faces
         const Vector n = (1 / length(area)) * area, along = (i.v - carried[0]) - dot(i.v - carried[0], n) * n;
         // The wall's drag, rho v_t^2 times its number, carries beside friction.
-        const double most = of_i.friction + (felt ? dragging * dot(along, along) : 0);
+        const double most = of_i.friction + felt * dragging * dot(along, along);
         if (most > 0) {
             const double stiffness = material.shear * length(area) / (s.how.h / 2) / i.density; // 1/s^2
             Vector slip = kept.slip + dt * (i.v - carried[0]);
