@@ -385,9 +385,13 @@ private:
                 continue;
             }
             // scale and grad W.n have opposite signs: the face is approached where their product with v.n is positive
-            const bool pressed = held_by > 0, counts = pressed || s * at(w.approach, k) > 0;
+            const bool pressed = held_by > 0, approached = s * at(w.approach, k) > 0;
+            // It acts in the half step before if the strain of this step knew of the face, in that to come if the next one will: soil that
+            // is let go, or caught, is so at once in both, else the stress of half a step would be work of the wall.
+            const bool counted = in.dt > 0 ? pressure[i] > 0 || approached : pressed || approached;
+            const double share = 0.5 * (counted + (pressed || approached));
             const Material& m = in.soils[in.soils.size() == 1 ? 0 : std::as_const(p)[field::soil][i]];
-            const double presses = (counts ? held_by : 0) + at(push_out, k) * at(w.grip, k);
+            const double presses = share * held_by + at(push_out, k) * at(w.grip, k);
             const double most = limit[i] + lag(in.dt, m.c_p, h_).take * presses;
             // the faces' mean velocity
             Vector carried{}, carried_next{};
@@ -400,14 +404,14 @@ private:
             const Vector slides = v[i] - carried, normal = (1 / area) * faces;
             // rho (g/xi) v_t^2 on the faces' area
             const double drag =
-                counts ? -s * at(w.dragging, k) * at(rho, k) * (dot(slides, slides) - dot(slides, normal) * dot(slides, normal)) : 0;
+                -share * s * at(w.dragging, k) * at(rho, k) * (dot(slides, slides) - dot(slides, normal) * dot(slides, normal));
             const auto f = return_to_coulomb(slip[i], in.dt * slides, normal, most + drag, spring_stiffness(m.shear, area, h_));
             slip.set(i, f.slip), pressure.set(i, pressed ? length(push) : 0.0), limit.set(i, most);
-            const Vector all = counts ? push + f.force : f.force;
+            const Vector all = share * push + f.force;
             out[0][k] = all.x, out[1][k] = all.y, out[2][k] = all.z;
             if (!wall_power) continue;
-            worked[0][k] = (counts ? s * at(power.pressing, k) : 0) + dot(f.force, carried);
-            worked[1][k] = (counts ? s * at(power.pressing_next, k) : 0) + dot(f.force, carried_next);
+            worked[0][k] = share * s * at(power.pressing, k) + dot(f.force, carried);
+            worked[1][k] = share * s * at(power.pressing_next, k) + dot(f.force, carried_next);
         }
         if (wall_power) watts.now = watts.now + load<U>(worked[0]), watts.next = watts.next + load<U>(worked[1]);
         return held + Vec3<U>{load<U>(out[0]), load<U>(out[1]), load<U>(out[2])};

@@ -17,8 +17,9 @@
 //              a spring n omega^2 d, omega = 0.3 c_p/h
 //
 // A wall point mirrors the particle at one exposed face of the ground, the union of all walls and their images across the periods: the
-// nearest one that has the particle in front. P_w = 1 at rough faces, n (x) n at smooth ones and Coulomb's. Where the wall of that face
-// moves, v_i less the velocity of the face stands for v_i, and its power counts apart.
+// nearest one that has the particle in front; near its plane the normal turns to the next such face's. P_w = 1 at rough faces, n (x) n at
+// smooth ones and Coulomb's. Where the wall of that face moves, v_i less the velocity of the face stands for v_i, and its power counts
+// apart.
 #include "solver/kernels/by_the_book.hpp"
 #include "solver/physics/drucker_prager.hpp"
 #include "solver/scene/ground.hpp"
@@ -37,11 +38,26 @@ struct Ground {
     std::vector<Part> parts;
     int dimensions;
     double spacing; // m
-    bool holds(Vector x) const
+    /// -1 in the ground, 0 on its surface or where two parts of it touch, 1 in the air.
+    int side(Vector x) const
     {
-        return std::ranges::any_of(parts, [&](const Part& p) { return scene::contains(p.shape, x, dimensions); });
+        double depth = -std::numeric_limits<double>::infinity();
+        for (const Part& p : parts) depth = std::max(depth, -scene::signed_distance(p.shape, x, dimensions));
+        return depth > 1e-11 * spacing ? -1 : depth >= -1e-11 * spacing ? 0 : 1;
     }
 };
+/// So many directions around a way, none along the axes, as edges are; in 2-D the two across it.
+inline std::vector<Vector> directions_across(Vector way, int dimensions, int around)
+{
+    if (dimensions == 2) return {{-way.z, 0, way.x}, {way.z, 0, -way.x}};
+    const Vector c = cross(way, std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0}), a = (1 / length(c)) * c, b = cross(way, a);
+    std::vector<Vector> all;
+    for (int k = 0; k < around; ++k) {
+        const double turn = (2 * k + 1) * std::numbers::pi / around;
+        all.push_back(std::cos(turn) * a + std::sin(turn) * b);
+    }
+    return all;
+}
 inline scene::Shape shifted(scene::Shape shape, Vector by)
 {
     if (auto* b = std::get_if<scene::Box>(&shape)) b->low = b->low + by, b->high = b->high + by;
@@ -109,7 +125,7 @@ inline std::vector<OnFace> nearest_on_each_face(const scene::Shape& shape, Vecto
             const double right = scene::area(*p) >= 0 ? 1 : -1;
             all.push_back({on, (right / length(edge)) * Vector{edge.z, 0, -edge.x}});
         }
-        if (dimensions == 3 && scene::contains(*p, {x.x, (p->y[0] + p->y[1]) / 2, x.z}))
+        if (dimensions == 3 && scene::signed_distance(*p, {x.x, (p->y[0] + p->y[1]) / 2, x.z}, 2) < 1e-12)
             for (const int end : {0, 1}) all.push_back({{x.x, p->y[std::size_t(end)], x.z}, {0, end ? 1.0 : -1.0, 0}});
     } else if (const auto* g = std::get_if<scene::Ground>(&shape)) {
         const auto nearest = g->field->nearest(x);
@@ -124,27 +140,55 @@ struct Face {
     double depth; // m
     int wall;     // whose contact counts
     Vector side;  // of that wall there: at an edge not the normal
+    bool tied;    // as near as the one before it
+    Vector plane; // its own normal, where that turns to another's
 };
 /// Where faces of two walls meet in one edge, the one with more grip counts: rough, then Coulomb by its friction, then smooth.
 inline double grip(const scene::Wall& w)
 {
     return w.surface == scene::Surface::Rough ? std::numbers::pi : w.surface == scene::Surface::Coulomb ? w.friction_angle : -1;
 }
+/// True if there is air beyond a point of a face, or, where that is on the surface of what lies beside, around it.
+inline bool open(const Ground& ground, Vector foot, Vector way)
+{
+    const double least = 1e-6 * ground.spacing;
+    const Vector beyond = foot + least * way;
+    if (ground.side(beyond) != 0) return ground.side(beyond) > 0;
+    return std::ranges::any_of(directions_across(way, ground.dimensions, 8),
+                               [&](Vector along) { return ground.side(beyond + least * along) > 0; });
+}
+/// True if a face goes on from this point of it: a thousandth of a spacing along it is air before it and ground behind, of this part.
+inline bool goes_on(const Ground& ground, Vector foot, Vector normal, const Ground::Part* part = nullptr)
+{
+    return std::ranges::any_of(directions_across(normal, ground.dimensions, 8), [&](Vector along) {
+        const Vector at = foot + 1e-3 * ground.spacing * along, over = 2e-6 * ground.spacing * normal;
+        return ground.side(at + over) > 0 && ground.side(at - over) < 0 &&
+               (!part || scene::contains(part->shape, at - over, ground.dimensions));
+    });
+}
 /// True if all that lies across the way to an edge is ground, a hundredth of a spacing beside it and a little back: along the axes, in
 /// which most pieces end, and around.
 inline bool folds(const Ground& ground, Vector edge, Vector way)
 {
-    const Vector c = cross(way, std::fabs(way.z) < 0.8 ? Vector{0, 0, 1} : Vector{1, 0, 0}), a = (1 / length(c)) * c, b = cross(way, a);
     std::vector<Vector> beside{{1, 0, 0}, {-1, 0, 0}, {0, 0, 1}, {0, 0, -1}};
     if (ground.dimensions == 3) {
         beside.insert(beside.end(), {{0, 1, 0}, {0, -1, 0}});
-        for (int k = 0; k < 16; ++k) beside.push_back(std::cos(k * std::numbers::pi / 8) * a + std::sin(k * std::numbers::pi / 8) * b);
+        for (const Vector& along : directions_across(way, 3, 16)) beside.push_back(along);
     }
     return std::ranges::all_of(beside, [&](Vector along) {
         const Vector across = along - dot(along, way) * way;
         const double l = length(across);
-        return l <= 1e-3 || ground.holds(edge + ground.spacing * ((1e-2 / l) * across - 5e-6 * way));
+        return l <= 1e-3 || ground.side(edge + ground.spacing * ((1e-2 / l) * across - 5e-6 * way)) <= 0;
     });
+}
+/// An edge is of the wall with most grip among those whose faces meet there, whichever of them ends there.
+inline void take_grip(Face& f, const Ground& ground, std::span<const scene::Wall> walls, Vector edge)
+{
+    for (const auto& part : ground.parts)
+        for (const OnFace& on : nearest_on_each_face(part.shape, edge, ground.dimensions))
+            if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(f.wall)]) &&
+                length(on.point - edge) <= 2e-6 * ground.spacing && goes_on(ground, edge, on.normal, &part))
+                f.wall = part.wall, f.side = on.normal;
 }
 /// Exposed faces no further than `reach` from x, a point inside the ground, nearest first.
 inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const scene::Wall> walls, Vector x, double reach)
@@ -160,18 +204,26 @@ inline std::vector<Face> exposed_faces(const Ground& ground, std::span<const sce
             const double depth = straight ? along : away;
             if (depth > reach) continue;
             const Vector normal = straight ? on.normal : (1 / depth) * way;
-            if (depth > least && dot(way, normal) < 0) continue;   // seen from behind
-            if (ground.holds(on.point + least * normal)) continue; // covered
+            if (depth > least && dot(way, normal) < 0) continue; // seen from behind
+            if (!open(ground, on.point, normal)) continue;       // covered
             // An edge counts where the ground folds about it: the surface does not go on to where it is nearer.
-            if (!straight && !folds(ground, on.point, normal)) continue;
+            if (straight ? !goes_on(ground, on.point, normal) : !folds(ground, on.point, normal)) continue;
+            Face face{normal, depth, part.wall, on.normal, false, normal};
+            if (!straight || ground.side(on.point + least * normal) == 0) take_grip(face, ground, walls, on.point);
             const auto same = std::ranges::find_if(
                 all, [&](const Face& f) { return std::fabs(f.depth - depth) <= least && dot(f.normal, normal) > 1 - 1e-9; });
-            if (same == all.end()) all.push_back({normal, depth, part.wall, on.normal});
-            else if (grip(walls[std::size_t(part.wall)]) > grip(walls[std::size_t(same->wall)]))
-                same->wall = part.wall, same->side = on.normal;
+            if (same == all.end()) all.push_back(face);
+            else if (grip(walls[std::size_t(face.wall)]) > grip(walls[std::size_t(same->wall)]))
+                same->wall = face.wall, same->side = face.side;
         }
     // Of equally near ones that which faces up, then along x, then y: the order of walls and faces does not show.
-    std::ranges::sort(all, {}, [&](const Face& f) { return f.depth - least * dot(f.normal, {0.1, 0.01, 1}); });
+    std::ranges::sort(all, {}, &Face::depth);
+    for (auto first = all.begin(); first != all.end();) {
+        const auto last = std::find_if(first, all.end(), [&](const Face& f) { return f.depth > first->depth + least; });
+        std::ranges::sort(first, last, {}, [](const Face& f) { return -dot(f.normal, {0.1, 0.01, 1}); });
+        for (auto f = first; f != last; ++f) f->tied = f != first;
+        first = last;
+    }
     return all;
 }
 /// A point of a wall and the exposed faces that it stands behind.
@@ -183,14 +235,38 @@ struct GroundPoint {
 /// Coulomb's friction of a face, rad.
 inline double friction_at(const GroundPoint& w, const Face& face, const scene::Wall& wall)
 {
-    return scene::friction_angle_at(wall, w.x + face.depth * face.normal);
+    return scene::friction_angle_at(wall, w.x + face.depth * face.plane);
 }
-/// The face at which a point mirrors particle i, x_ij = x_i - x_w: the nearest that has i in front, else the nearest.
-inline const Face& mirroring(const GroundPoint& w, Vector x_ij)
+/// The face at which a point mirrors particle i, x_ij = x_i - x_w: the nearest that has i in front, else the nearest, but with a normal
+/// that turns from that of one face to that of the next:
+///
+///     n = sum_g c_g N_g, made a unit vector,   N_g = sum_k f_k n_k / sum_k f_k,   c_g = s_g prod_(nearer g') (1 - s_g')
+///
+/// over groups g of equally near faces k, f_k >= 0 how far i lies in front, s_g = min(1, sum_k f_k/(h/4)). The wall is that of the face
+/// with the largest f/(f + h/4) prod (1 - s); behind all faces that of the least deep of the nearest.
+inline Face mirroring(const GroundPoint& w, Vector x_ij, double h)
 {
-    for (const Face& f : w.faces)
-        if (dot(x_ij, f.normal) > f.depth) return f;
-    return w.faces.front();
+    const double ramp = h / 4;
+    double left = 1, most = 0;
+    Vector n{};
+    const auto depth_behind = [&](const Face& f) { return f.depth - dot(x_ij, f.normal); };
+    auto group = w.faces.begin();
+    auto after = [&](auto first) { return std::find_if(first + 1, w.faces.end(), [](const Face& f) { return !f.tied; }); };
+    Face chosen = *std::min_element(group, after(group), [&](auto& a, auto& b) { return depth_behind(a) < depth_behind(b); });
+    for (; group != w.faces.end(); group = after(group)) {
+        double sum = 0;
+        Vector together{};
+        for (auto f = group; f != after(group); ++f) {
+            const double in_front = std::max(-depth_behind(*f), 0.0), counts = left * in_front / (in_front + ramp);
+            sum += in_front, together = together + in_front * f->normal;
+            if (counts > most) most = counts, chosen = *f;
+        }
+        if (sum == 0) continue;
+        const double share = left * std::min(sum / ramp, 1.0);
+        n = n + (share / sum) * together, left -= share;
+    }
+    if (length(n) > 1e-6) chosen.normal = (1 / length(n)) * n;
+    return chosen;
 }
 /// P a.
 inline Vector crossing(const scene::Wall& wall, const Face& face, Vector a)
@@ -204,7 +280,7 @@ inline Vector velocity_of(const GroundPoint& w, const Face& face, const std::vec
 {
     if (motion.empty()) return {};
     const Vector v = motion[std::size_t(face.wall)], other = motion[std::size_t(w.wall)];
-    return dot(face.side, face.normal) > 1 - 1e-9 ? v : other + dot(v - other, face.side) * face.side;
+    return dot(face.side, face.plane) > 1 - 1e-9 ? v : other + dot(v - other, face.side) * face.side;
 }
 
 // ---- the state -----------------------------------------------------------------------------------------------------
@@ -311,7 +387,7 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
         if (w.faces.empty() || grad == Vector{}) continue;
         of_i.crowd = of_i.crowd + (i.volume * crowding(kernel, s.how.spacing, length(r))) * grad;
         of_i.inside -= i.volume * dot(r, grad) / s.how.dimensions;
-        const Face& face = mirroring(w, r);
+        const Face face = mirroring(w, r, s.how.h);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         const Vector mirrored = mirror * crossing(wall, face, i.v - velocity_of(w, face, s.motion)); // v_iw
         Matrix& L_of_it = wall.surface == scene::Surface::Coulomb ? sliding : of_i.L_walls;
@@ -456,10 +532,10 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         const Vector r = i.x - w.x, grad = kernel.gradient(r);
         if (w.faces.empty() || length(r) >= 2 * s.how.h) continue;
         ++of_i.pairs;
-        const Face& face = mirroring(w, r);
+        const Face face = mirroring(w, r, s.how.h);
         const scene::Wall& wall = s.walls[std::size_t(face.wall)];
         if (length(r) < out.distance) {
-            const double sunk = std::holds_alternative<scene::Ground>(wall.shape) ? std::max(face.depth - dot(r, face.normal), 0.0) : 0.0;
+            const double sunk = std::holds_alternative<scene::Ground>(wall.shape) ? std::max(face.depth - dot(r, face.plane), 0.0) : 0.0;
             const double omega = 0.3 * material.c_p / s.how.h;
             out = {length(r), (omega * omega * sunk) * face.normal,
                    wall.surface == scene::Surface::Coulomb ? std::tan(friction_at(w, face, wall)) : 0.0};
@@ -483,21 +559,23 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
     }
     Vector by_walls = (1 / i.density) * held + out.push;
     double power[2] = {held_power[0] / i.density, held_power[1] / i.density};
-    // Coulomb: the wall is felt where it presses, or where the particle comes nearer. Friction is a spring of the soil's shear stiffness
+    // Coulomb: the wall is felt where it presses, or where the particle comes nearer; half of it by whether the strain of this step counted
+    // it, half by whether the next one will. Friction is a spring of the soil's shear stiffness
     // across half a smoothing length that carries no more than the limit and keeps the slip that carries it.
     if (length(area) > 0) {
         of_i.contact = limit > 0 ? Forced::Contact::Presses : approach > 0 ? Forced::Contact::Approached : Forced::Contact::LetGo;
-        const bool felt = of_i.contact != Forced::Contact::LetGo;
-        const double lag = 4 * s.how.h / material.c_p, presses = (felt ? limit / i.density : 0) + length(out.push) * out.grip;
+        const bool now = of_i.contact != Forced::Contact::LetGo, before = dt > 0 ? kept.pressed > 0 || approach > 0 : now;
+        const double felt = (before ? 0.5 : 0) + (now ? 0.5 : 0);
+        const double lag = 4 * s.how.h / material.c_p, presses = felt * limit / i.density + length(out.push) * out.grip;
         of_i.pressed = limit > 0 ? length(push) / i.density : 0;
         of_i.friction = kept.friction + (dt > 0 ? dt / (lag + dt) : 1) * presses;
-        if (felt) by_walls = by_walls + (1 / i.density) * push;
-        for (int t = 0; t < 2; ++t) power[t] += felt ? push_power[t] / i.density : 0;
+        by_walls = by_walls + (felt / i.density) * push;
+        for (int t = 0; t < 2; ++t) power[t] += felt * push_power[t] / i.density;
         if (all_faces != 0)
             for (Vector& c : carried) c = (1 / all_faces) * c; // the mean velocity of the faces
         const Vector n = (1 / length(area)) * area, along = (i.v - carried[0]) - dot(i.v - carried[0], n) * n;
         // The wall's drag, rho v_t^2 times its number, carries beside friction.
-        const double most = of_i.friction + (felt ? dragging * dot(along, along) : 0);
+        const double most = of_i.friction + felt * dragging * dot(along, along);
         if (most > 0) {
             const double stiffness = material.shear * length(area) / (s.how.h / 2) / i.density; // 1/s^2
             Vector slip = kept.slip + dt * (i.v - carried[0]);

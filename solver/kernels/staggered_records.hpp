@@ -131,7 +131,7 @@ public:
                     to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
                                         T(wall.surface == scene::Surface::Rough), T(coulomb),
                                         T(coulomb ? std::tan(scene::friction_angle_at(wall, f.foot(at))) : 0), T(0),
-                                        T(std::holds_alternative<scene::Ground>(wall.shape)), T(wall.drag)});
+                                        T(std::holds_alternative<scene::Ground>(wall.shape)), T(wall.drag), T(f.tied)});
                 }
                 to.first[k + 1] = Index(to.faces.size());
                 if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);
@@ -270,6 +270,7 @@ protected:
     KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, std::span<const Index> runs, Vec3<V> back, Visit visit) const
     {
         const auto [support, support2, softening, tiny] = Base::lengths();
+        const V ramp(T(face_ramp * h_ / unit_));
         while (!runs.empty()) {
             const WallRecords<T>& wall = walls_[runs[0]];
             const auto list = runs.subspan(2, runs[1]);
@@ -281,7 +282,7 @@ protected:
                 if (!hits || wall.first[point] == wall.first[point + 1]) continue;
                 const FaceMotion<T>* motion = nullptr;
                 if constexpr (moving) motion = &wall.motion[wall.first[point]];
-                visit(r, max(r2, tiny), hits, mirror<moving>(Law{}, r, &wall.faces[wall.first[point]], motion));
+                visit(r, max(r2, tiny), hits, mirror<moving>(Law{}, r, &wall.faces[wall.first[point]], ramp, motion));
             }
         }
     }

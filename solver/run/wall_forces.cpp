@@ -56,12 +56,11 @@ void WallForces::see(Index wall, Index point, Vector x, const Stress& sigma, std
     const auto& faces = faces_[std::size_t(wall)][std::size_t(point)];
     if (!(t > 0) || faces.empty()) return;
     const auto of_now = [&](const Face& f) { return own || since_[std::size_t(f.wall)] ? face_of_now(f, then, now) : f; };
-    // the first face in front of which the particle lies, as in the pair loop
-    const auto in_front = std::ranges::find_if(faces, [&](const Face& f) {
+    const std::size_t mirrors = mirroring_face(faces, face_ramp * scene_.smoothing_length(), [&](const Face& f) {
         const Face here = of_now(f);
-        return here.depth < dot(r, here.normal);
+        return dot(r, here.normal) - here.depth;
     });
-    const Face face = of_now(in_front == faces.end() ? faces.back() : *in_front);
+    const Face face = of_now(faces[mirrors]);
     const scene::Wall& of = scene_.walls[std::size_t(face.wall)];
     const bool rough = of.surface == scene::Surface::Rough;
     const bool grips = rough || (of.surface == scene::Surface::Coulomb && of.friction_angle > 0); // it bears along its face too

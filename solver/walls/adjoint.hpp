@@ -26,6 +26,7 @@ template <class T> struct FaceRecord {
     T last;    // 1 for the last face of its point
     T holds;   // 1 where sunk soil is held out: real ground
     T drag;    // traction over rho v^2
+    T tied;    // 1 where it is as near as the one before it
 };
 /// How the surface moves there, m/s: in this step, and in the step to come.
 template <class T> struct FaceMotion {
@@ -56,10 +57,9 @@ struct MirrorImage {
     template <class V> KUZURE_INLINE V factor(V, V) const { return V(number<V>(2)); }
 };
 
-/// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
-/// `motion`: of the faces, where walls move.
+/// How a point mirrors each lane (FacesInFront). `ramp`: face_ramp in the unit of the pair sums; `motion`: of the faces, where walls move.
 template <bool moving, class Law, class V, class T>
-KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceMotion<T>* motion)
+KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, V ramp, const FaceMotion<T>* motion)
 {
     const auto of = [&](const FaceRecord<T>& f) {
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
@@ -81,23 +81,20 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
     };
     Mirror<V> m = of(*face);
     if (face->last != T(0)) return m;
-    V settled = select(less(V(face->depth), dot(r, m.normal)), V(T(1)), V(T(0)));
+    FacesInFront<V> faces(ramp);
+    faces.add(m.normal, dot(r, m.normal) - V(face->depth), false);
     do {
         ++face;
         if constexpr (moving) ++motion;
         const Mirror<V> next = of(*face);
-        const V take = select(less(V(face->depth), dot(r, next.normal)), V(T(1)) - settled, V(T(0)));
-        const auto use = less(V(T(0.5)), take);
-        m.normal = {select(use, next.normal.x, m.normal.x), select(use, next.normal.y, m.normal.y), select(use, next.normal.z, m.normal.z)};
+        const auto use = faces.add(next.normal, dot(r, next.normal) - V(face->depth), face->tied != T(0));
+        m.normal = faces.chosen(use, next.normal, m.normal);
         m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
         m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
         m.sunk = select(use, next.sunk, m.sunk), m.drag = select(use, next.drag, m.drag);
-        if constexpr (moving) {
-            m.v = {select(use, next.v.x, m.v.x), select(use, next.v.y, m.v.y), select(use, next.v.z, m.v.z)};
-            m.next = {select(use, next.next.x, m.next.x), select(use, next.next.y, m.next.y), select(use, next.next.z, m.next.z)};
-        }
-        settled = settled + take;
+        if constexpr (moving) m.v = faces.chosen(use, next.v, m.v), m.next = faces.chosen(use, next.next, m.next);
     } while (face->last == T(0));
+    m.normal = faces.normal(m.normal);
     return m;
 }
 /// Acceleration (m/s^2) along the normal of real ground of soil that lies `depth` (m) behind the face of the wall point nearest to it. Soil

@@ -308,13 +308,10 @@ inline Generated generate(unsigned seed)
     const auto draw_all = [&](const auto& ground) {
         g.drawings.push_back({draw_ground(ground, draw, false)});
         g.drawings.push_back({draw_ground(ground, draw, true), {}, draw.between(0.05, 0.5), 0, "cut"});
-        // Of two faces that are equally near, as at a brick's edge, the one that faces up, then along x counts: such ground may be divided,
-        // but unless it is rough not turned, without a difference.
-        const bool even = bricks && surface != 0, turned = g.dimensions == 3 && bricks && draw.chance(0.5);
+        const bool turned = g.dimensions == 3 && bricks && draw.chance(0.5);
         Drawing again{{}, {}, draw.between(0.05, 0.5), 0, "cut"};
         if (g.periodic)
             again.low = draw.whole(1, int(g.width / spacing + 0.5) - 1) * spacing, again.what += ", faces of the period elsewhere";
-        else if (even) again.skin = 0.01;
         else if (turned) again.motion.turned = true, again.what += ", turned";
         else again.motion.mirrored = true, again.what += ", mirrored";
         again.walls = draw_ground(ground, draw, true, again.low);

@@ -5,41 +5,67 @@
 
 namespace kuzure::validation {
 
-/// Faces behind which each wall point lies, however the ground is cut.
+/// A wall point, put back into the first drawing, and the faces that it lies behind; of equally near ones the order does not count.
+struct Backed {
+    Vector x;
+    std::vector<Face> faces;
+};
+inline std::vector<Backed> backed(const Generated& g, const Drawing& d)
+{
+    SceneText t;
+    const Scene scene = scene_of(g, d, 1, t);
+    const WallSurface surface(scene);
+    const auto back = [&](Vector a) {
+        if (d.motion.turned) a = {a.y, -a.x, a.z};
+        return d.motion.mirrored ? Vector{-a.x, a.y, a.z} : a;
+    };
+    const auto place = [](const Vector& x) { // to a thousandth of a spacing, in order
+        const auto whole = [](double a) { return std::llround(1e3 * a / spacing); };
+        return std::array{whole(x.z), whole(x.y), whole(x.x)};
+    };
+    std::vector<Backed> points;
+    for (const auto& wall : scene.walls) {
+        const scene::Lattice lattice(wall.shape, spacing, g.dimensions);
+        for (std::int64_t k = 0; k < lattice.size(); ++k) {
+            const Vector at = lattice.position(k);
+            Backed p{back(at), {}};
+            if (g.periodic) p.x.x -= std::floor(p.x.x / g.width + 1e-9) * g.width;
+            surface.faces(at, scene.support(), p.faces);
+            for (Face& f : p.faces) f.normal = back(f.normal), f.wall = int(scene.walls[std::size_t(f.wall)].surface);
+            std::ranges::sort(p.faces, {}, [&](const Face& f) { return std::pair(place({0, 0, f.depth}), place(f.normal)); });
+            points.push_back(p);
+        }
+    }
+    std::ranges::sort(points, {}, [&](const Backed& p) { return place(p.x); });
+    return points;
+}
+/// Which wall points there are and the faces behind which each lies, however the ground is cut, shifted, mirrored, turned.
 inline void expect_same_faces(unsigned first, unsigned count)
 {
+    const auto told = [](const Backed& p) {
+        std::string text = fmt::format("({:.2f}, {:.2f}, {:.2f}) spacings:", p.x.x / spacing, p.x.y / spacing, p.x.z / spacing);
+        for (const Face& f : p.faces)
+            text += fmt::format(" ({:.4g}, {:.4g}, {:.4g}) {:.12g}", f.normal.x, f.normal.y, f.normal.z, f.depth / spacing);
+        return text;
+    };
+    const auto alike = [](const Face& a, const Face& b) {
+        return std::fabs(a.depth - b.depth) < 1e-9 * spacing && dot(a.normal, b.normal) > 1 - 1e-12 && a.wall == b.wall;
+    };
     for (unsigned seed = first; seed < first + count; ++seed) {
         const Generated g = generate(seed);
-        const auto scene = [&](const Drawing& d) {
-            SceneText t;
-            return scene_of(g, d, 1, t);
-        };
-        const Scene one = scene(g.drawings[0]), other = scene(g.drawings[1]);
-        const WallSurface a(one), b(other);
-        int wrong = 0;
-        std::vector<Face> x, y;
-        for (const auto& wall : one.walls) {
-            const scene::Lattice lattice(wall.shape, spacing, g.dimensions);
-            for (std::int64_t k = 0; k < lattice.size(); ++k) {
-                const Vector at = lattice.position(k);
-                a.faces(at, one.support(), x), b.faces(at, other.support(), y);
-                bool same = x.size() == y.size();
-                for (std::size_t f = 0; same && f < x.size(); ++f)
-                    same = std::fabs(x[f].depth - y[f].depth) < 1e-9 * spacing && dot(x[f].normal, y[f].normal) > 1 - 1e-12 &&
-                           one.walls[x[f].wall].surface == other.walls[y[f].wall].surface;
-                if (same || ++wrong > 1) continue; // the first tells enough
-                std::string faces;
-                for (const auto* list : {&x, &y}) {
-                    for (const Face& f : *list)
-                        faces += fmt::format(" ({:.4g}, {:.4g}, {:.4g}) {:.12g}", f.normal.x, f.normal.y, f.normal.z, f.depth / spacing);
-                    faces += list == &x ? " but cut" : "";
-                }
-                ADD_FAILURE() << g.what << ", at "
-                              << fmt::format("({:.2f}, {:.2f}, {:.2f})", at.x / spacing, at.y / spacing, at.z / spacing)
-                              << " spacings:" << faces;
+        const auto measure = backed(g, g.drawings[0]);
+        for (std::size_t q = 1; q < g.drawings.size(); ++q) {
+            const auto other = backed(g, g.drawings[q]);
+            ASSERT_EQ(other.size(), measure.size()) << g.what << ", " << g.drawings[q].what;
+            int wrong = 0;
+            for (std::size_t k = 0; k < measure.size(); ++k) {
+                const Backed &a = measure[k], &b = other[k];
+                if (length(a.x - b.x) < 1e-9 * spacing && std::ranges::equal(a.faces, b.faces, alike)) continue;
+                if (++wrong == 1) // the first tells enough
+                    ADD_FAILURE() << g.what << ", " << g.drawings[q].what << ": " << told(a) << " but " << told(b);
             }
+            EXPECT_EQ(wrong, 0) << g.what << ", " << g.drawings[q].what;
         }
-        EXPECT_EQ(wrong, 0) << g.what;
     }
 }
 
