@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <map>
+#include <unordered_map>
 
 namespace kuzure {
 namespace {
