@@ -43,7 +43,8 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
                      Timers& timers, double way)
 {
     reach_ = std::max(list_reach(scene_), scene_.support() + way * (1 + 1e-6));
-    rethrow_on_all_ranks(comm, [&] {
+    std::string complaint;
+    try {
         timers.timed(Phase::Sort, [&] {
             const auto x = p[field::sorted_position];
             sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
@@ -51,9 +52,11 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
         });
         // every column read and written once
         timers.did(Phase::Sort, 0, 2.0 * double(p.bytes_per_particle()) * double(p.size()));
-    });
+    } catch (const NumbersFailed& e) {
+        complaint = e.what(); // all ranks fail together, when the halo is planned
+    }
     timers.timed(Phase::Ghosts, [&] {
-        exchange_ghosts(comm, domain, p, model);
+        exchange_ghosts(comm, domain, p, model, complaint);
         renew_walls(p, model);
     });
     timers.timed(Phase::Lists, [&] {
@@ -70,12 +73,14 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
     built_ = true;
 }
 
-void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model)
+void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model,
+                             const std::string& complaint)
 {
     std::vector<std::size_t> ghost_bytes;
     for (const Stage& s : model.stages()) ghost_bytes.push_back(s.ghost_bytes);
-    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), ghost_bytes);
-    const auto arrived = halo_->ghosts(p);
+    auto plan = domain.plan_halo(p[field::sorted_position], p.size(), reach_, complaint);
+    std::vector<Ghost> arrived;
+    halo_.emplace(comm, std::move(plan), ghost_bytes, p, arrived);
     const auto n = Index(arrived.size());
     Array<double> x(n), y(n), z(n);
     Array<std::int64_t> id(n);
@@ -188,18 +193,6 @@ std::size_t Layout::bytes() const
     std::size_t b = lists_.bytes() + std::size_t(ghosts()) * 32;
     for (const auto& w : walls_) b += w.x.size() * (3 * sizeof(double) + sizeof(std::int64_t) + sizeof(Index));
     return b;
-}
-
-void rethrow_on_all_ranks(const Comm& comm, const std::function<void()>& work)
-{
-    std::string complaint;
-    try {
-        work();
-    } catch (const NumbersFailed& e) {
-        complaint = e.what();
-    }
-    const int worst = int(comm.max(std::int64_t(complaint.empty() ? -1 : comm.rank())));
-    if (worst >= 0) throw NumbersFailed(comm.broadcast(complaint, worst));
 }
 
 } // namespace kuzure
