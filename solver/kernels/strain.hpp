@@ -52,7 +52,7 @@ private:
     {
         Cluster<V> i = Below::cluster_at(in, cluster, tally);
         if (i.moving == 0) { // its list is pruned when it wakes
-            if (in.prune) in.lists->pruned(cluster).n = -1;
+            if (in.prune) in.lists->forget_pruned(cluster);
             return;
         }
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
@@ -136,7 +136,7 @@ private:
     }
 
     template <bool moving>
-    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, StrainWalls<Wide>& out,
+    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, const WallList& runs, StrainWalls<Wide>& out,
                                            ViscousPower<Wide>* power_out) const
     {
         const V half_dt(T(0.5 * in.dt / unit_));

@@ -5,6 +5,7 @@
 #include "perf/phases.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include "solver/run/cover.hpp"
+#include "solver/run/memory_use.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
 
@@ -46,7 +47,7 @@ public:
     /// How far lists and ghosts reach, m.
     double reach() const { return reach_; }
     bool built() const { return built_; }
-    std::size_t bytes() const;
+    void add_bytes(MemoryUse&) const;
 
 private:
     void exchange_ghosts(const Comm&, const Domain&, const Particles&, const PairModel&, const std::string& complaint);

@@ -14,30 +14,45 @@
 #include "solver/pairs/cluster.hpp"
 #include "solver/scene/parts.hpp"
 #include "solver/walls/surface.hpp"
+#include <array>
 
 namespace kuzure {
 
-/// One exposed face behind which a wall point lies, as lanes see it; lengths in the unit of the pair sums.
-template <class T> struct FaceRecord {
-    T nx, ny, nz, depth;
+/// What exposed faces are like, as lanes see them: of a plane wall all alike.
+template <class T> struct FaceKind {
+    T nx, ny, nz;
     T stick;   // 1: all of the motion is mirrored (rough), 0: its normal part
     T coulomb; // 1 where Coulomb's law holds
     T tangent; // tan(friction angle)
-    T last;    // 1 for the last face of its point
     T holds;   // 1 where sunk soil is held out: real ground
     T drag;    // traction over rho v^2
+};
+/// One of them behind which a wall point lies, by its depth in the unit of the pair sums.
+template <class T> struct FaceRecord {
+    T depth;
+    Index kind; // in WallRecords::kinds
+    Index last; // 1 for the last face of its point
 };
 /// How the surface moves there, m/s: in this step, and in the step to come.
 template <class T> struct FaceMotion {
     T vx, vy, vz, next_x, next_y, next_z;
 };
 
-/// Points of one wall as the pair loop reads them, and the faces of each.
+/// Points of one wall as the pair loop reads them, and the faces of each, one at least.
 template <class T> struct WallRecords {
-    Array<Coordinate<T>> x, y, z;
+    const Coordinate<T>*x = nullptr, *y = nullptr, *z = nullptr; // the run's own points where those serve, else `made`
+    std::array<Array<Coordinate<T>>, 3> made;
     std::vector<Index> first; // of each point in `faces`
     std::vector<FaceRecord<T>> faces;
+    std::vector<FaceKind<T>> kinds;
     std::vector<FaceMotion<T>> motion; // of each face, where walls move; else empty
+    std::size_t bytes() const
+    {
+        std::size_t b = 0;
+        for (const auto& m : made) b += m.capacity() * sizeof(Coordinate<T>);
+        return b + first.capacity() * sizeof(Index) + faces.capacity() * sizeof(FaceRecord<T>) + kinds.capacity() * sizeof(FaceKind<T>) +
+               motion.capacity() * sizeof(FaceMotion<T>);
+    }
 };
 
 /// What the lanes of a cluster see of one wall point.
@@ -59,11 +74,12 @@ struct MirrorImage {
 /// The nearest face in front of which each lane lies; where it lies behind all of them, the nearest.
 /// `motion`: of the faces, where walls move.
 template <bool moving, class Law, class V, class T>
-KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceMotion<T>* motion)
+KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceKind<T>* kinds, const FaceMotion<T>* motion)
 {
-    const auto of = [&](const FaceRecord<T>& f) {
+    const auto of = [&](const FaceRecord<T>& one) {
+        const FaceKind<T>& f = kinds[one.kind];
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
-        const V along = dot(r, n), depth(f.depth);
+        const V along = dot(r, n), depth(one.depth);
         Mirror<V> m{n,
                     law.factor(along, depth),
                     V(f.stick),
@@ -80,7 +96,7 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
         return m;
     };
     Mirror<V> m = of(*face);
-    if (face->last != T(0)) return m;
+    if (face->last) return m;
     V settled = select(less(V(face->depth), dot(r, m.normal)), V(T(1)), V(T(0)));
     do {
         ++face;
@@ -97,7 +113,7 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
             m.next = {select(use, next.next.x, m.next.x), select(use, next.next.y, m.next.y), select(use, next.next.z, m.next.z)};
         }
         settled = settled + take;
-    } while (face->last == T(0));
+    } while (!face->last);
     return m;
 }
 /// Acceleration (m/s^2) along the normal of real ground of soil that lies `depth` (m) behind the face of the wall point nearest to it. Soil
