@@ -239,6 +239,18 @@ void find_sends(View<Shape::Vector, const double> x, std::span<const Index> memb
         }
 }
 
+/// What was found block by block, to the plan's peers in the order of owned particles; those without any go.
+void put_in_order(const std::vector<std::vector<Entry>>& found, HaloPlan& plan)
+{
+    for (const auto& f : found)
+        for (const Entry& e : f) plan.peers[e.peer].sends.push_back(e.send);
+    std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
+    for (auto& p : plan.peers) {
+        std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
+        p.sends.shrink_to_fit();
+    }
+}
+
 } // namespace
 
 Domain::Surveyed Domain::survey(View<Shape::Vector, const double> x, Index n, bool keys) const
@@ -286,25 +298,11 @@ void Domain::tell_all(const Bounds& mine, double reach, std::span<const std::arr
     ++s.tellings;
 }
 
-HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach, const std::string& complaint) const
+double Domain::agree(const Surveyed& soil, View<Shape::Vector, const double> x, const Bounds& whole, const std::string& complaint,
+                     double& grown) const
 {
-    HaloPlan plan;
-    const std::vector<int> shifts = possible_shifts(space_, plan);
-    std::vector<std::array<double, 3>> ways;
-    for (const int s : shifts) ways.push_back(shift_of(plan, s));
     const auto& length = space_.period_length();
-    for (int a = 0; a < 3; ++a) ensure(space_.period()[a] == 0 || reach <= length[a], "the halo reaches further than a period");
-
-    const bool alone = comm_.size() == 1 && shifts.size() == 1;
-    const Surveyed soil = complaint.empty() ? survey(x, n, !alone) : Surveyed{};
     const bool complains = !complaint.empty() || soil.lost >= 0;
-    const ByBlock blocks = by_block(x, complains ? std::vector<std::uint64_t>{} : soil.key);
-    const auto& box = blocks.box;
-    Bounds whole = Bounds::none();
-    for (const auto& b : box) whole.add(b.low, b.high);
-
-    // The one reduction: who complains, who has soil where none may be, how large coordinates are, how far soil has left what was told.
-    auto& near = surroundings_.near;
     double agreed[4] = {complains ? comm_.rank() : -1.0, double(soil.outside),
                         std::max({soil.largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])}),
                         overhang(whole, surroundings_.told)};
@@ -314,54 +312,71 @@ HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double 
         throw NumbersFailed(comm_.broadcast(words, rank));
     }
     ensure(agreed[1] == 0, "a halo is planned while particles lie outside the period");
-    if (alone) return plan;
-    const double safe = halo_reach(reach, agreed[2]), reach2 = safe * safe;
-    double grown = agreed[3];
-    if (!(safe + 2 * grown <= surroundings_.held)) tell_all(whole, safe, ways), grown = 0;
+    grown = agreed[3];
+    return agreed[2];
+}
 
-    // Each rank tells those whose soil may be near it which of its blocks' boxes that is; more boxes than are near change no plan.
+std::vector<MessageOf<Bounds>> Domain::exchange_boxes(const std::vector<Bounds>& box, std::span<const std::array<double, 3>> ways,
+                                                      double reach2, double grown) const
+{
     std::vector<MessageOf<Bounds>> out;
-    const auto tell = [&](int r, const Bounds& theirs) {
+    for (const auto& [r, told] : surroundings_.near) {
+        const Bounds theirs = widened(told, grown);
         MessageOf<Bounds> p{r, {}};
         for (const auto& b : box)
             if (std::ranges::any_of(ways, [&](const auto& d) { return squared_distance(b, d.data(), theirs) <= reach2; }))
                 p.items.push_back(b);
         if (!p.items.empty()) out.push_back(std::move(p));
-    };
-    for (const auto& [r, told] : near) tell(r, widened(told, grown));
-    if (shifts.size() > 1 && !box.empty()) out.push_back({comm_.rank(), box});
-    const auto theirs = comm_.exchange(out);
+    }
+    if (ways.size() > 1 && !box.empty()) out.push_back({comm_.rank(), box});
+    return comm_.exchange(out);
+}
 
+HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach, const std::string& complaint) const
+{
+    HaloPlan plan;
+    const std::vector<int> shifts = possible_shifts(space_, plan);
+    std::vector<std::array<double, 3>> ways;
+    for (const int s : shifts) ways.push_back(shift_of(plan, s));
+    for (int a = 0; a < 3; ++a)
+        ensure(space_.period()[a] == 0 || reach <= space_.period_length()[a], "the halo reaches further than a period");
+
+    const bool alone = comm_.size() == 1 && shifts.size() == 1;
+    Surveyed soil;
+    if (complaint.empty()) soil = survey(x, n, !alone);
+    if (soil.lost >= 0) soil.key.clear();
+    const ByBlock blocks = by_block(x, soil.key);
+    Bounds whole = Bounds::none();
+    for (const auto& b : blocks.box) whole.add(b.low, b.high);
+    double grown = 0;
+    const double safe = halo_reach(reach, agree(soil, x, whole, complaint, grown)), reach2 = safe * safe;
+    if (alone) return plan;
+    if (!(safe + 2 * grown <= surroundings_.held)) tell_all(whole, safe, ways), grown = 0;
+
+    // Each rank tells those whose soil may be near it which of its blocks' boxes that is; more boxes than are near change no plan.
+    const auto theirs = exchange_boxes(blocks.box, ways, reach2, grown);
     std::vector<Bounds> around(theirs.size(), Bounds::none());
     for (std::size_t peer = 0; peer < theirs.size(); ++peer)
         for (const auto& b : theirs[peer].items) around[peer].add(b.low, b.high);
-    const int n_boxes = int(box.size());
+    const int n_boxes = int(blocks.box.size());
     std::vector<std::vector<Entry>> found(n_boxes);
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g) {
         std::vector<const Bounds*> close;
+        const std::span<const Index> members(blocks.member.data() + blocks.first[g], blocks.member.data() + blocks.first[g + 1]);
         for (int peer = 0; peer < int(theirs.size()); ++peer)
             for (std::size_t k = 0; k < shifts.size(); ++k) {
-                const auto& them = theirs[peer];
-                if (them.rank == comm_.rank() && shifts[k] == HaloPlan::no_shift) continue;
-                const auto& d = ways[k];
-                if (squared_distance(box[g], d.data(), around[peer]) > reach2) continue;
+                if (theirs[peer].rank == comm_.rank() && shifts[k] == HaloPlan::no_shift) continue;
+                const double* d = ways[k].data();
+                if (squared_distance(blocks.box[g], d, around[peer]) > reach2) continue;
                 close.clear();
-                for (const auto& b : them.items)
-                    if (squared_distance(box[g], d.data(), b) <= reach2) close.push_back(&b);
-                if (close.empty()) continue;
-                const std::span<const Index> members(blocks.member.data() + blocks.first[g], blocks.member.data() + blocks.first[g + 1]);
-                find_sends(x, members, d.data(), peer, shifts[k], reach2, close, found[g]);
+                for (const auto& b : theirs[peer].items)
+                    if (squared_distance(blocks.box[g], d, b) <= reach2) close.push_back(&b);
+                if (!close.empty()) find_sends(x, members, d, peer, shifts[k], reach2, close, found[g]);
             }
     }
     for (const auto& them : theirs) plan.peers.push_back({them.rank, {}});
-    for (const auto& f : found)
-        for (const Entry& e : f) plan.peers[e.peer].sends.push_back(e.send);
-    std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
-    for (auto& p : plan.peers) {
-        std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
-        p.sends.shrink_to_fit();
-    }
+    put_in_order(found, plan);
     return plan;
 }
 

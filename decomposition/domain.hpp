@@ -96,6 +96,13 @@ private:
         std::int64_t tellings = 0;
     };
     void tell_all(const Bounds& mine, double reach, std::span<const std::array<double, 3>> shifts) const;
+    /// The one reduction before a halo: who complains (thrown on all), who has soil where none may be; returns the largest coordinate or
+    /// period of any rank, m, and in `grown` how far soil has left what was told.
+    double agree(const Surveyed&, View<Shape::Vector, const double> x, const Bounds& whole, const std::string& complaint,
+                 double& grown) const;
+    /// Sends each rank that may be near the boxes of this rank's blocks that are in its reach; theirs, by rank.
+    std::vector<MessageOf<Bounds>> exchange_boxes(const std::vector<Bounds>&, std::span<const std::array<double, 3>> shifts, double reach2,
+                                                  double grown) const;
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 

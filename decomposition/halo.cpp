@@ -111,16 +111,24 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> record_
 }
 
 namespace {
-/// Makes the Ghost of an owned particle.
+/// A Ghost as it travels: its soil above the 48 bits that number particles.
+struct TravellingGhost {
+    Vector sorted_position;
+    std::uint64_t id_and_soil;
+    Ghost arrived() const
+    {
+        return {sorted_position, std::int64_t(id_and_soil & ((std::uint64_t(1) << 48) - 1)), std::int32_t(id_and_soil >> 48)};
+    }
+};
+static_assert(sizeof(TravellingGhost) == 32);
+/// Makes that of an owned particle.
 auto ghost_of(const Particles& p)
 {
     return [x = p[field::sorted_position], id = p[field::id],
             soil = p.has(field::soil) ? p[field::soil].column[0] : nullptr](Index i, Vector shift) {
-        Ghost g{};
-        g.sorted_position = x[i] + shift;
-        g.id = id[i];
-        g.soil = soil ? soil[i] : 0;
-        return g;
+        const std::int64_t number = id[i], of = soil ? soil[i] : 0;
+        ensure(number >= 0 && number >> 48 == 0 && of >= 0 && of >> 16 == 0, "a particle's number or soil is too large for a ghost");
+        return TravellingGhost{x[i] + shift, std::uint64_t(number) | std::uint64_t(of) << 48};
     };
 }
 } // namespace
@@ -131,14 +139,14 @@ Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> record_
 {
     arrived.clear();
     std::vector<Arrival> arrivals;
-    const auto in = comm.exchange(outgoing<Ghost>(impl_->plan, ghost_of(particles)));
+    const auto in = comm.exchange(outgoing<TravellingGhost>(impl_->plan, ghost_of(particles)));
     std::size_t n = 0;
     for (const auto& p : in) n += p.items.size();
     arrived.reserve(n);
     for (const auto& p : in) {
         ensure(p.items.size() <= std::size_t(std::numeric_limits<Index>::max()), "more than 2^31 ghosts on one rank");
         arrivals.push_back({p.rank, Index(p.items.size())});
-        arrived.insert(arrived.end(), p.items.begin(), p.items.end());
+        for (const auto& g : p.items) arrived.push_back(g.arrived());
     }
     open(arrivals, record_bytes);
 }
@@ -186,7 +194,12 @@ std::size_t Halo::bytes() const
     return b;
 }
 
-std::vector<Ghost> Halo::ghosts(const Particles& p) const { return collect<Ghost>(ghost_of(p)); }
+std::vector<Ghost> Halo::ghosts(const Particles& p) const
+{
+    std::vector<Ghost> all;
+    for (const auto& g : collect<TravellingGhost>(ghost_of(p))) all.push_back(g.arrived());
+    return all;
+}
 
 void Halo::assign_slots(std::span<const Index> slot)
 {

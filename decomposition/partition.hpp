@@ -45,7 +45,7 @@ inline Block wrapped(Block b, const std::array<std::int32_t, 3>& period)
     return b;
 }
 
-/// From blocks to their index in a list. A table of places, half of them empty at least, where a block is at the first free one from
+/// From blocks to their index in a list. A table of slots, half of them empty at least, where a block is at the first free one from
 /// where its key is mixed to: a cut looks at the 26 blocks around each, of which a std::unordered_map would make its greatest part.
 class BlockIndex {
 public:
@@ -53,37 +53,37 @@ public:
     {
         std::size_t size = 16;
         while (size < 2 * n) size *= 2;
-        if (size <= place_.size()) return;
-        std::vector<Place> old(size);
-        old.swap(place_);
-        for (const Place& p : old)
-            if (p.value >= 0) place_[where(p.key)] = p;
+        if (size <= slot_.size()) return;
+        std::vector<Slot> old(size);
+        old.swap(slot_);
+        for (const Slot& p : old)
+            if (p.value >= 0) slot_[where(p.key)] = p;
     }
     /// Values are not negative.
     void set(const Block& b, int value)
     {
         reserve(count_ + 1);
-        Place& p = place_[where(key_of(b))];
+        Slot& p = slot_[where(key_of(b))];
         count_ += p.value < 0;
         p = {key_of(b), value};
     }
     /// The value set for this block, or -1.
     int operator[](const Block& b) const { return of_key(key_of(b)); }
-    int of_key(std::uint64_t key) const { return place_.empty() ? -1 : place_[where(key)].value; }
+    int of_key(std::uint64_t key) const { return slot_.empty() ? -1 : slot_[where(key)].value; }
 
 private:
-    struct Place {
+    struct Slot {
         std::uint64_t key = 0;
         int value = -1;
     };
-    /// The place of this key, or the empty one where it belongs.
+    /// The slot of this key, or the empty one where it belongs.
     std::size_t where(std::uint64_t key) const
     {
-        std::size_t k = mix(key) & (place_.size() - 1);
-        while (place_[k].value >= 0 && place_[k].key != key) k = (k + 1) & (place_.size() - 1);
+        std::size_t k = mix(key) & (slot_.size() - 1);
+        while (slot_[k].value >= 0 && slot_[k].key != key) k = (k + 1) & (slot_.size() - 1);
         return k;
     }
-    std::vector<Place> place_;
+    std::vector<Slot> slot_;
     std::size_t count_ = 0;
 };
 

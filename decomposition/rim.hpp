@@ -33,14 +33,14 @@ RimBlock best_rim_block(const BlockGraph& g, std::span<const int> part, int from
 }
 
 /// The same for many choices one after the other, of which each changes little: what each block could do is kept, and only that of the
-/// neighbours of a block that goes is looked up anew.
+/// neighbours of a block that goes is judged anew.
 class RimChoices {
 public:
     /// All must outlive it. `ties` as above.
     RimChoices(const BlockGraph& g, std::span<const int> part, int from, std::span<const int> members, std::vector<double>& ties)
         : g_(g), part_(part), from_(from), members_(members), ties_(ties), choices_(members.size()), number_(std::size_t(g.size()), -1)
     {
-        for (std::size_t k = 0; k < members.size(); ++k) number_[members[k]] = int(k), look_up(k);
+        for (std::size_t k = 0; k < members.size(); ++k) number_[members[k]] = int(k), judge(k);
     }
     template <class May> RimBlock best(May may) const
     {
@@ -53,9 +53,9 @@ public:
     /// After part[b] of a member has changed.
     void changed(int b)
     {
-        look_up(std::size_t(number_[b]));
+        judge(std::size_t(number_[b]));
         for (const auto& l : g_.links(b))
-            if (const int k = number_[l.block]; k >= 0) look_up(std::size_t(k));
+            if (const int k = number_[l.block]; k >= 0) judge(std::size_t(k));
     }
 
 private:
@@ -63,7 +63,7 @@ private:
         int to;
         double gain;
     };
-    void look_up(std::size_t k)
+    void judge(std::size_t k)
     {
         const int b = members_[k];
         auto& mine = choices_[k];
