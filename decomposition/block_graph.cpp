@@ -21,18 +21,27 @@ void check_block(const BlockWork& b, const BlockGrid& grid)
 
 void append_links(const BlockGraph& g, const BlockIndex& index, int b, std::vector<BlockGraph::Link>& to)
 {
+    const Block& here = g.block[b];
+    bool plain = true; // no period, and no block around it is beyond the limit
+    for (int a = 0; a < 3; ++a) plain = plain && g.grid.period[a] == 0 && here[a] > -block_limit && here[a] < block_limit - 1;
+    std::array<double, 3> reach;
+    for (int a = 0; a < 3; ++a) reach[a] = std::min(1.0, g.grid.reach[a]);
+    const std::uint64_t key = key_of(here);
     for (int code = 0; code < 27; ++code) {
-        const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
         if (code == 13) continue;
-        Block there = g.block[b];
-        double share = 1; // of a block's particles within reach of the other block
-        for (int a = 0; a < 3; ++a) {
-            there[a] += d[a];
-            if (d[a]) share *= std::min(1.0, g.grid.reach[a]);
+        const std::array<std::int8_t, 3> d{std::int8_t(code / 9 - 1), std::int8_t(code / 3 % 3 - 1), std::int8_t(code % 3 - 1)};
+        int n = -1;
+        if (plain)
+            n = index.of_key(key + (std::uint64_t(std::int64_t(d[0])) << 42) + (std::uint64_t(std::int64_t(d[1])) << 21) +
+                             std::uint64_t(std::int64_t(d[2])));
+        else {
+            const Block there = wrapped({here[0] + d[0], here[1] + d[1], here[2] + d[2]}, g.grid.period);
+            if (within_limit(there)) n = index[there];
         }
-        there = wrapped(there, g.grid.period);
-        const int n = within_limit(there) ? index[there] : -1;
-        if (n >= 0) to.push_back({n, d, share * g.grid.ghost_bytes * (g.particles[b] + g.particles[n])});
+        if (n < 0) continue;
+        double share = 1; // of a block's particles within reach of the other block
+        for (int a = 0; a < 3; ++a) share *= d[a] ? reach[a] : 1.0;
+        to.push_back({n, d, share * g.grid.ghost_bytes * (g.particles[b] + g.particles[n])});
     }
 }
 

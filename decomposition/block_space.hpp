@@ -68,6 +68,27 @@ inline double squared_distance(const Bounds& a, const double* d, const Bounds& b
     }
     return sum;
 }
+/// Gap between box a, moved by d, and box b on the axis where it is widest, m; none where they meet on all.
+inline double widest_gap(const Bounds& a, const double* d, const Bounds& b)
+{
+    double widest = 0;
+    for (int k = 0; k < 3; ++k) widest = std::max({widest, b.low[k] - (a.high[k] + d[k]), (a.low[k] + d[k]) - b.high[k]});
+    return widest;
+}
+/// How far `now` reaches beyond `before` on any axis, m; infinite where there was nothing before.
+inline double overhang(const Bounds& now, const Bounds& before)
+{
+    if (now.empty()) return 0;
+    double most = 0;
+    for (int k = 0; k < 3; ++k) most = std::max({most, before.low[k] - now.low[k], now.high[k] - before.high[k]});
+    return most;
+}
+/// A box and so much around it, m.
+inline Bounds widened(Bounds b, double by)
+{
+    for (int k = 0; k < 3; ++k) b.low[k] -= by, b.high[k] += by;
+    return b;
+}
 /// Of a point.
 inline double squared_distance(Vector v, const double* d, const Bounds& b)
 {

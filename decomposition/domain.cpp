@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <map>
+#include <unordered_map>
 
 namespace kuzure {
 namespace {
@@ -174,8 +175,9 @@ struct ByBlock {
     std::vector<Bounds> box;
     std::vector<Index> first, member; // of a block's particles in `member`, and the end
 };
-ByBlock by_block(View<Shape::Vector, const double> x, Index n, const std::vector<std::uint64_t>& key)
+ByBlock by_block(View<Shape::Vector, const double> x, const std::vector<std::uint64_t>& key)
 {
+    const auto n = Index(key.size());
     ByBlock all{{}, {0}, std::vector<Index>(n)};
     auto& [box, first, member] = all;
     std::unordered_map<std::uint64_t, int> local;
@@ -237,14 +239,27 @@ void find_sends(View<Shape::Vector, const double> x, std::span<const Index> memb
         }
 }
 
+/// What was found block by block, to the plan's peers in the order of owned particles; those without any go.
+void put_in_order(const std::vector<std::vector<Entry>>& found, HaloPlan& plan)
+{
+    for (const auto& f : found)
+        for (const Entry& e : f) plan.peers[e.peer].sends.push_back(e.send);
+    std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
+    for (auto& p : plan.peers) {
+        std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
+        p.sends.shrink_to_fit();
+    }
+}
+
 } // namespace
 
-std::vector<std::uint64_t> Domain::block_keys(View<Shape::Vector, const double> x, Index n, double& largest) const
+Domain::Surveyed Domain::survey(View<Shape::Vector, const double> x, Index n, bool keys) const
 {
     const auto &low = space_.period_low(), &length = space_.period_length();
     const auto& period = space_.period();
     // Blocks are not wrapped here: one across a period's seam would fill a box as long as the period.
-    std::vector<std::uint64_t> key(n);
+    Surveyed of;
+    if (keys) of.key.resize(n);
     double most = 0;
     bool outside = false;
     Index lost = -1;
@@ -255,7 +270,7 @@ std::vector<std::uint64_t> Domain::block_keys(View<Shape::Vector, const double> 
             lost = std::max(lost, i);
             continue;
         }
-        key[i] = key_of(b);
+        if (keys) of.key[i] = key_of(b);
         for (int a = 0; a < 3; ++a) {
             const double c = x.column[a][i];
             most = std::max(most, std::abs(c));
@@ -263,70 +278,105 @@ std::vector<std::uint64_t> Domain::block_keys(View<Shape::Vector, const double> 
             if (period[a]) outside = outside || c < low[a] - slack || c > low[a] + length[a] + slack;
         }
     }
-    stop_if_lost(lost >= 0, lost >= 0 ? x[lost] : Vector{});
-    ensure(!comm_.any(outside), "a halo is planned while particles lie outside the period");
-    largest = most;
-    return key;
+    of.largest = most, of.lost = lost, of.outside = outside;
+    return of;
 }
 
-HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const
+void Domain::tell_all(const Bounds& mine, double reach, std::span<const std::array<double, 3>> shifts) const
+{
+    // The more is held, the more ranks are asked at a rebuild, and the longer that lasts: here until soil has moved by 2.5 reaches, some
+    // twenty rebuilds of soil that flies.
+    auto& s = surroundings_;
+    s.told = mine, s.held = 6 * reach;
+    s.near.clear();
+    const auto all = comm_.allgather(mine);
+    for (int r = 0; r < comm_.size(); ++r) {
+        if (r == comm_.rank() || mine.empty() || all[r].empty()) continue;
+        if (std::ranges::any_of(shifts, [&](const auto& d) { return widest_gap(mine, d.data(), all[r]) <= s.held; }))
+            s.near.emplace_back(r, all[r]);
+    }
+    ++s.tellings;
+}
+
+double Domain::agree(const Surveyed& soil, View<Shape::Vector, const double> x, const Bounds& whole, const std::string& complaint,
+                     double& grown) const
+{
+    const auto& length = space_.period_length();
+    const bool complains = !complaint.empty() || soil.lost >= 0;
+    double agreed[4] = {complains ? comm_.rank() : -1.0, double(soil.outside),
+                        std::max({soil.largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])}),
+                        overhang(whole, surroundings_.told)};
+    comm_.max(std::span<double>(agreed));
+    if (const int rank = int(agreed[0]); rank >= 0) {
+        const std::string words = !complaint.empty() ? complaint : soil.lost >= 0 ? lost_at(x[soil.lost]) : std::string();
+        throw NumbersFailed(comm_.broadcast(words, rank));
+    }
+    ensure(agreed[1] == 0, "a halo is planned while particles lie outside the period");
+    grown = agreed[3];
+    return agreed[2];
+}
+
+std::vector<MessageOf<Bounds>> Domain::exchange_boxes(const std::vector<Bounds>& box, std::span<const std::array<double, 3>> ways,
+                                                      double reach2, double grown) const
+{
+    std::vector<MessageOf<Bounds>> out;
+    for (const auto& [r, told] : surroundings_.near) {
+        const Bounds theirs = widened(told, grown);
+        MessageOf<Bounds> p{r, {}};
+        for (const auto& b : box)
+            if (std::ranges::any_of(ways, [&](const auto& d) { return squared_distance(b, d.data(), theirs) <= reach2; }))
+                p.items.push_back(b);
+        if (!p.items.empty()) out.push_back(std::move(p));
+    }
+    if (ways.size() > 1 && !box.empty()) out.push_back({comm_.rank(), box});
+    return comm_.exchange(out);
+}
+
+HaloPlan Domain::plan_halo(View<Shape::Vector, const double> x, Index n, double reach, const std::string& complaint) const
 {
     HaloPlan plan;
     const std::vector<int> shifts = possible_shifts(space_, plan);
-    const auto& length = space_.period_length();
-    for (int a = 0; a < 3; ++a) ensure(space_.period()[a] == 0 || reach <= length[a], "the halo reaches further than a period");
+    std::vector<std::array<double, 3>> ways;
+    for (const int s : shifts) ways.push_back(shift_of(plan, s));
+    for (int a = 0; a < 3; ++a)
+        ensure(space_.period()[a] == 0 || reach <= space_.period_length()[a], "the halo reaches further than a period");
 
-    double largest = 0;
-    const std::vector<std::uint64_t> key = block_keys(x, n, largest);
-    const ByBlock blocks = by_block(x, n, key);
-    const auto& box = blocks.box;
+    const bool alone = comm_.size() == 1 && shifts.size() == 1;
+    Surveyed soil;
+    if (complaint.empty()) soil = survey(x, n, !alone);
+    if (soil.lost >= 0) soil.key.clear();
+    const ByBlock blocks = by_block(x, soil.key);
     Bounds whole = Bounds::none();
-    for (const auto& b : box) whole.add(b.low, b.high);
+    for (const auto& b : blocks.box) whole.add(b.low, b.high);
+    double grown = 0;
+    const double safe = halo_reach(reach, agree(soil, x, whole, complaint, grown)), reach2 = safe * safe;
+    if (alone) return plan;
+    if (!(safe + 2 * grown <= surroundings_.held)) tell_all(whole, safe, ways), grown = 0;
 
-    const double extent = std::max({largest, std::abs(length[0]), std::abs(length[1]), std::abs(length[2])});
-    const double safe = halo_reach(reach, comm_.max(extent)), reach2 = safe * safe;
-
-    // First whole ranks, then their blocks: each rank tells those near it which of its boxes are near them.
-    const auto wholes = comm_.allgather(whole);
-    std::vector<MessageOf<Bounds>> out;
-    for (int r = 0; r < comm_.size(); ++r) {
-        if (whole.empty() || wholes[r].empty()) continue;
-        MessageOf<Bounds> p{r, {}};
-        if (r == comm_.rank()) {
-            if (shifts.size() > 1) p.items = box;
-        } else {
-            for (const auto& b : box)
-                if (std::ranges::any_of(shifts, [&](int s) { return squared_distance(b, shift_of(plan, s).data(), wholes[r]) <= reach2; }))
-                    p.items.push_back(b);
-        }
-        if (!p.items.empty()) out.push_back(std::move(p));
-    }
-    const auto theirs = comm_.exchange(out);
-
-    const int n_boxes = int(box.size());
+    // Each rank tells those whose soil may be near it which of its blocks' boxes that is; more boxes than are near change no plan.
+    const auto theirs = exchange_boxes(blocks.box, ways, reach2, grown);
+    std::vector<Bounds> around(theirs.size(), Bounds::none());
+    for (std::size_t peer = 0; peer < theirs.size(); ++peer)
+        for (const auto& b : theirs[peer].items) around[peer].add(b.low, b.high);
+    const int n_boxes = int(blocks.box.size());
     std::vector<std::vector<Entry>> found(n_boxes);
 #pragma omp parallel for schedule(dynamic) if (n > parallel)
     for (int g = 0; g < n_boxes; ++g) {
-        std::vector<const Bounds*> near;
+        std::vector<const Bounds*> close;
+        const std::span<const Index> members(blocks.member.data() + blocks.first[g], blocks.member.data() + blocks.first[g + 1]);
         for (int peer = 0; peer < int(theirs.size()); ++peer)
-            for (const int s : shifts) {
-                const auto& them = theirs[peer];
-                if (them.rank == comm_.rank() && s == HaloPlan::no_shift) continue;
-                const auto d = shift_of(plan, s);
-                if (squared_distance(box[g], d.data(), wholes[them.rank]) > reach2) continue;
-                near.clear();
-                for (const auto& b : them.items)
-                    if (squared_distance(box[g], d.data(), b) <= reach2) near.push_back(&b);
-                if (near.empty()) continue;
-                const std::span<const Index> members(blocks.member.data() + blocks.first[g], blocks.member.data() + blocks.first[g + 1]);
-                find_sends(x, members, d.data(), peer, s, reach2, near, found[g]);
+            for (std::size_t k = 0; k < shifts.size(); ++k) {
+                if (theirs[peer].rank == comm_.rank() && shifts[k] == HaloPlan::no_shift) continue;
+                const double* d = ways[k].data();
+                if (squared_distance(blocks.box[g], d, around[peer]) > reach2) continue;
+                close.clear();
+                for (const auto& b : theirs[peer].items)
+                    if (squared_distance(blocks.box[g], d, b) <= reach2) close.push_back(&b);
+                if (!close.empty()) find_sends(x, members, d, peer, shifts[k], reach2, close, found[g]);
             }
     }
     for (const auto& them : theirs) plan.peers.push_back({them.rank, {}});
-    for (const auto& f : found)
-        for (const Entry& e : f) plan.peers[e.peer].sends.push_back(e.send);
-    std::erase_if(plan.peers, [](const auto& p) { return p.sends.empty(); });
-    for (auto& p : plan.peers) std::ranges::sort(p.sends, {}, [](const HaloPlan::Send& s) { return std::pair(s.owned, s.shift); });
+    put_in_order(found, plan);
     return plan;
 }
 

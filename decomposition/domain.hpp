@@ -59,8 +59,12 @@ public:
     /// Who needs to see this rank's particles; collective. Every particle within `reach` (m) of a particle of
     /// another rank, or of any particle across a period, is sent there, whoever owns it and whether or not
     /// its block held soil at the last cut. On periodic axes positions must lie in [low, low + length] and reach <= length.
-    HaloPlan plan_halo(View<Shape::Vector, const double> x, Index n, double reach) const;
+    /// Throws NumbersFailed on every rank with the words of the highest one that complains: of a particle that is lost, or as `complaint`
+    /// says of what went wrong before; Broken where positions are not as said.
+    HaloPlan plan_halo(View<Shape::Vector, const double> x, Index n, double reach, const std::string& complaint = {}) const;
     HaloPlan plan_halo(const Particles& p, double reach) const { return plan_halo(p[field::position], p.size(), reach); }
+    /// How often all ranks told all others where their soil is, for plan_halo().
+    std::int64_t tellings() const { return surroundings_.tellings; }
 
     const Comm& comm() const { return comm_; }
     /// Blocks that held soil at the last cut, in lexicographic order, and their owners: all, or those that this rank knows.
@@ -74,8 +78,31 @@ public:
     const BlockSpace& space() const { return space_; }
 
 private:
-    /// Blocks of particles, and the largest of their coordinates (m). Collective.
-    std::vector<std::uint64_t> block_keys(View<Shape::Vector, const double> x, Index n, double& largest) const;
+    /// What a rank looks at before it plans a halo: its particles' blocks (nothing where there is no other rank and no period), the largest
+    /// of their coordinates (m), a particle that no block holds, or -1, and whether any lies outside its period.
+    struct Surveyed {
+        std::vector<std::uint64_t> key;
+        double largest = 0;
+        Index lost = -1;
+        bool outside = false;
+    };
+    Surveyed survey(View<Shape::Vector, const double> x, Index n, bool keys) const;
+    /// Ranks whose soil may be near this rank's, and the box around the soil of each when it was last told. From then on all ranks only
+    /// agree on how far any soil has left its rank's box: what was further apart than `held` on some axis still is, by twice that less.
+    struct Surroundings {
+        Bounds told = Bounds::none(); // this rank's own box
+        double held = -1;             // m; < 0: nothing was told yet
+        std::vector<std::pair<int, Bounds>> near;
+        std::int64_t tellings = 0;
+    };
+    void tell_all(const Bounds& mine, double reach, std::span<const std::array<double, 3>> shifts) const;
+    /// The one reduction before a halo: who complains (thrown on all), who has soil where none may be; returns the largest coordinate or
+    /// period of any rank, m, and in `grown` how far soil has left what was told.
+    double agree(const Surveyed&, View<Shape::Vector, const double> x, const Bounds& whole, const std::string& complaint,
+                 double& grown) const;
+    /// Sends each rank that may be near the boxes of this rank's blocks that are in its reach; theirs, by rank.
+    std::vector<MessageOf<Bounds>> exchange_boxes(const std::vector<Bounds>&, std::span<const std::array<double, 3>> shifts, double reach2,
+                                                  double grown) const;
     /// The same NumbersFailed on every rank, if a particle of any rank is lost; collective.
     void stop_if_lost(bool mine, Vector x) const;
 
@@ -83,6 +110,7 @@ private:
     BlockSpace space_;
     BlockOwners known_;
     bool is_cut_ = false;
+    mutable Surroundings surroundings_; // saves messages; no plan depends on it
 };
 
 } // namespace kuzure

@@ -131,10 +131,14 @@ Part::Part(int me, const std::vector<BlockWork>& mine, const std::vector<Message
     for (int d = 0; d < 2; ++d)
         for (int b = 0; b < n; ++b) {
             if (depth[b] != d) continue;
+            links[b].reserve(26);
             append_links(g, index, b, links[b]);
             for (const auto& l : links[b])
                 if (depth[l.block] < 0) depth[l.block] = d + 1;
         }
+    std::size_t all_links = 0;
+    for (const auto& some : links) all_links += some.size();
+    g.link.reserve(all_links), g.first.reserve(std::size_t(n) + 1);
     for (const auto& some : links) {
         g.first.push_back(g.link.size());
         g.link.insert(g.link.end(), some.begin(), some.end());
@@ -187,8 +191,9 @@ std::vector<MessageOf<Offer>> Part::offers(bool flowing, double mean)
     std::vector<MessageOf<Offer>> out;
     if (!flowing && work <= mean) return out;
     const auto always = [](int) { return true; };
+    RimChoices rim(g, owner, 0, home, ties);
     while (blocks - int(chosen_.size()) > 1) {
-        const RimBlock best = best_rim_block(g, owner, 0, home, ties, [&](int b, int q) {
+        const RimBlock best = rim.best([&](int b, int q) {
             const double w = g.work[b];
             return (flowing ? flow[q] >= 0.5 * w : load[q] + w < work) && !barred_[b] && rooted(b, q, always);
         });
@@ -200,6 +205,7 @@ std::vector<MessageOf<Offer>> Part::offers(bool flowing, double mean)
         chosen_.push_back({best.block, best.to});
         flow[best.to] -= g.work[best.block];
         owner[best.block] = best.to;
+        rim.changed(best.block);
         const int r = ranks[best.to];
         auto at = std::ranges::find(out, r, &MessageOf<Offer>::rank);
         if (at == out.end()) at = out.insert(out.end(), {r, {}});

@@ -63,8 +63,8 @@ Halo::~Halo()
     if (impl_ && impl_->in_flight) static_cast<void>(impl_.release());
 }
 
-/// Persistent messages for records of so many bytes, in the order of `counts`, what comes from each rank.
-Halo::Channel Halo::open_channel(std::size_t bytes, const std::vector<MessageOf<std::int64_t>>& counts)
+/// Persistent messages for records of so many bytes.
+Halo::Channel Halo::open_channel(std::size_t bytes, std::span<const Arrival> arrivals)
 {
     Impl& m = *impl_;
     const Comm& comm = m.comm;
@@ -73,8 +73,8 @@ Halo::Channel Halo::open_channel(std::size_t bytes, const std::vector<MessageOf<
     m.record.push_back(comm.native() ? mpi::item_of(bytes) : mpi::Type());
     auto& requests = m.channels.emplace_back();
     Index first = 0;
-    for (const auto& c : counts) {
-        const In in{first, Index(c.items[0]), m.arrivals.data() + std::size_t(first) * bytes};
+    for (const auto& c : arrivals) {
+        const In in{first, c.n, m.arrivals.data() + std::size_t(first) * bytes};
         if (c.rank != comm.rank()) {
             requests.push_back(MPI_REQUEST_NULL);
             check(MPI_Recv_init(in.records, in.n, m.record.back().type, c.rank, mpi::Refresh, mpi_comm, &requests.back()), "MPI_Recv_init");
@@ -102,36 +102,81 @@ Halo::Channel Halo::open_channel(std::size_t bytes, const std::vector<MessageOf<
 Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> record_bytes)
     : impl_(std::make_unique<Impl>(comm, std::move(plan)))
 {
+    std::vector<MessageOf<std::int64_t>> counts;
+    for (const auto& p : impl_->plan.peers)
+        if (!p.sends.empty()) counts.push_back({p.rank, {std::int64_t(p.sends.size())}});
+    std::vector<Arrival> arrivals;
+    for (const auto& c : comm.exchange(counts)) arrivals.push_back({c.rank, Index(c.items.at(0))});
+    open(arrivals, record_bytes);
+}
+
+namespace {
+/// A Ghost as it travels: its soil above the 48 bits that number particles.
+struct TravellingGhost {
+    Vector sorted_position;
+    std::uint64_t id_and_soil;
+    Ghost arrived() const
+    {
+        return {sorted_position, std::int64_t(id_and_soil & ((std::uint64_t(1) << 48) - 1)), std::int32_t(id_and_soil >> 48)};
+    }
+};
+static_assert(sizeof(TravellingGhost) == 32);
+/// Makes that of an owned particle.
+auto ghost_of(const Particles& p)
+{
+    return [x = p[field::sorted_position], id = p[field::id],
+            soil = p.has(field::soil) ? p[field::soil].column[0] : nullptr](Index i, Vector shift) {
+        const std::int64_t number = id[i], of = soil ? soil[i] : 0;
+        ensure(number >= 0 && number >> 48 == 0 && of >= 0 && of >> 16 == 0, "a particle's number or soil is too large for a ghost");
+        return TravellingGhost{x[i] + shift, std::uint64_t(number) | std::uint64_t(of) << 48};
+    };
+}
+} // namespace
+
+Halo::Halo(const Comm& comm, HaloPlan plan, std::span<const std::size_t> record_bytes, const Particles& particles,
+           std::vector<Ghost>& arrived)
+    : impl_(std::make_unique<Impl>(comm, std::move(plan)))
+{
+    arrived.clear();
+    std::vector<Arrival> arrivals;
+    const auto in = comm.exchange(outgoing<TravellingGhost>(impl_->plan, ghost_of(particles)));
+    std::size_t n = 0;
+    for (const auto& p : in) n += p.items.size();
+    arrived.reserve(n);
+    for (const auto& p : in) {
+        ensure(p.items.size() <= std::size_t(std::numeric_limits<Index>::max()), "more than 2^31 ghosts on one rank");
+        arrivals.push_back({p.rank, Index(p.items.size())});
+        for (const auto& g : p.items) arrived.push_back(g.arrived());
+    }
+    open(arrivals, record_bytes);
+}
+
+void Halo::open(std::span<const Arrival> arrivals, std::span<const std::size_t> record_bytes)
+{
     ensure(!record_bytes.empty() && std::ranges::min(record_bytes) > 0, "a halo's records have at least one byte");
     Impl& m = *impl_;
     const std::size_t longest = std::ranges::max(record_bytes);
-
-    std::vector<MessageOf<std::int64_t>> counts;
+    const int me = m.comm.rank();
+    for (const auto& p : m.plan.peers)
+        if (p.rank != me && !p.sends.empty()) records_ += std::int64_t(p.sends.size()), ++messages_;
     std::int64_t n_in = 0;
-    for (const auto& p : m.plan.peers) {
-        const auto n = std::int64_t(p.sends.size());
-        if (n == 0) continue;
-        counts.push_back({p.rank, {n}});
-        if (p.rank != comm.rank()) records_ += n, ++messages_;
-    }
-    counts = comm.exchange(counts);
-    for (const auto& c : counts) n_in += c.items.at(0);
+    for (const auto& a : arrivals) n_in += a.n;
     ensure(n_in <= std::numeric_limits<Index>::max() && records_ <= std::numeric_limits<Index>::max(), "more than 2^31 ghosts on one rank");
     m.n_ghosts = Index(n_in);
     m.outgoing.resize(std::size_t(records_) * longest);
     m.arrivals.resize(std::size_t(n_in) * longest);
-    for (const auto& c : counts) {
-        if (c.rank == comm.rank()) m.self = int(&c - counts.data());
-        else m.in_of_receive.push_back(int(&c - counts.data()));
+    for (std::size_t k = 0; k < arrivals.size(); ++k) {
+        if (arrivals[k].rank == me) m.self = int(k);
+        else m.in_of_receive.push_back(int(k));
     }
     m.n_receives = int(m.in_of_receive.size());
     int n_requests = m.n_receives;
     for (const auto& p : m.plan.peers)
-        if (!p.sends.empty()) m.send_of_out.push_back(p.rank == comm.rank() ? -1 : n_requests++);
+        if (!p.sends.empty()) m.send_of_out.push_back(p.rank == me ? -1 : n_requests++);
 
     for (const std::size_t bytes : record_bytes) {
         if (std::ranges::any_of(channels_, [&](const Channel& c) { return c.record_bytes == bytes; })) continue;
-        channels_.push_back(open_channel(bytes, counts));
+        channels_.push_back(open_channel(bytes, arrivals));
     }
     m.finished.resize(std::size_t(n_requests));
     slot_.resize(m.n_ghosts);
@@ -142,18 +187,18 @@ Index Halo::n_ghosts() const { return impl_->n_ghosts; }
 const HaloPlan& Halo::plan() const { return impl_->plan; }
 const Comm& Halo::comm() const { return impl_->comm; }
 
+std::size_t Halo::bytes() const
+{
+    std::size_t b = impl_->outgoing.capacity() + impl_->arrivals.capacity() + slot_.capacity() * sizeof(Index);
+    for (const auto& p : plan().peers) b += p.sends.capacity() * sizeof(HaloPlan::Send);
+    return b;
+}
+
 std::vector<Ghost> Halo::ghosts(const Particles& p) const
 {
-    const auto x = p[field::sorted_position];
-    const auto id = p[field::id];
-    const std::int32_t* soil = p.has(field::soil) ? p[field::soil].column[0] : nullptr;
-    return collect<Ghost>([&](Index i, Vector shift) {
-        Ghost g{};
-        g.sorted_position = x[i] + shift;
-        g.id = id[i];
-        g.soil = soil ? soil[i] : 0;
-        return g;
-    });
+    std::vector<Ghost> all;
+    for (const auto& g : collect<TravellingGhost>(ghost_of(p))) all.push_back(g.arrived());
+    return all;
 }
 
 void Halo::assign_slots(std::span<const Index> slot)

@@ -36,6 +36,8 @@ public:
     /// Collective. The plan's counts are exchanged; records of a refresh have one of these sizes, packed without gaps.
     Halo(const Comm&, HaloPlan, std::span<const std::size_t> record_bytes);
     Halo(const Comm& comm, HaloPlan plan, std::size_t record_bytes) : Halo(comm, std::move(plan), std::span(&record_bytes, 1)) {}
+    /// The same with the ghosts of these particles in one exchange: as ghosts() gives them.
+    Halo(const Comm&, HaloPlan, std::span<const std::size_t> record_bytes, const Particles&, std::vector<Ghost>& arrived);
     Halo(Halo&&) noexcept;
     Halo& operator=(Halo&&) noexcept;
     ~Halo();
@@ -47,16 +49,8 @@ public:
     /// One Record per ghost in arrival order, made by its owner: make(Index owned, Vector shift) -> Record. Collective.
     template <class Record, class Make> std::vector<Record> collect(Make make) const
     {
-        static_assert(std::is_trivially_copyable_v<Record>);
-        std::vector<MessageOf<Record>> out;
-        for (const auto& peer : plan().peers) {
-            MessageOf<Record> p{peer.rank, {}};
-            p.items.reserve(peer.sends.size());
-            for (const auto& s : peer.sends) p.items.push_back(make(s.owned, plan().shift[s.shift]));
-            if (!p.items.empty()) out.push_back(std::move(p));
-        }
         std::vector<Record> all;
-        for (const auto& p : comm().exchange(out)) all.insert(all.end(), p.items.begin(), p.items.end());
+        for (const auto& p : comm().exchange(outgoing<Record>(plan(), make))) all.insert(all.end(), p.items.begin(), p.items.end());
         ensure(all.size() == std::size_t(n_ghosts()), "a halo delivers another number of ghosts than planned");
         return all;
     }
@@ -103,6 +97,8 @@ public:
     std::int64_t bytes_per_refresh() const { return records_ * std::int64_t(channels_.front().record_bytes); }
     int messages_per_refresh() const { return messages_; }
     std::int64_t refreshes() const { return refreshes_; }
+    /// Of its plan and buffers.
+    std::size_t bytes() const;
 
 private:
     static constexpr Index parallel_records = 2048;
@@ -121,10 +117,28 @@ private:
         std::vector<Out> out;
         std::vector<In> in;
     };
+    template <class Record, class Make> static std::vector<MessageOf<Record>> outgoing(const HaloPlan& plan, Make make)
+    {
+        static_assert(std::is_trivially_copyable_v<Record>);
+        std::vector<MessageOf<Record>> out;
+        for (const auto& peer : plan.peers) {
+            MessageOf<Record> p{peer.rank, {}};
+            p.items.reserve(peer.sends.size());
+            for (const auto& s : peer.sends) p.items.push_back(make(s.owned, plan.shift[s.shift]));
+            if (!p.items.empty()) out.push_back(std::move(p));
+        }
+        return out;
+    }
+    /// From what comes of each rank, by rank.
+    struct Arrival {
+        int rank;
+        Index n;
+    };
+    void open(std::span<const Arrival>, std::span<const std::size_t> record_bytes);
     const Comm& comm() const;
     const Channel& now() const { return channels_[current_]; }
     int n_out() const { return int(channels_.front().out.size()); }
-    Channel open_channel(std::size_t record_bytes, const std::vector<MessageOf<std::int64_t>>& counts);
+    Channel open_channel(std::size_t record_bytes, std::span<const Arrival>);
     void start_receives(std::size_t record_bytes);
     void start_send(int peer);
     int next_arrival();

@@ -1,13 +1,13 @@
 #pragma once
 // Who gets which block of space: a graph of the blocks that hold soil, weighted by work and by halo bytes,
 // cut into parts of equal work with little halo. Serial and without MPI, so `kuzure scale` cuts for any number of ranks.
+#include "solver/core/mix.hpp"
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 namespace kuzure {
@@ -45,20 +45,46 @@ inline Block wrapped(Block b, const std::array<std::int32_t, 3>& period)
     return b;
 }
 
-/// From blocks to their index in a list.
+/// From blocks to their index in a list. A table of slots, half of them empty at least, where a block is at the first free one from
+/// where its key is mixed to: a cut looks at the 26 blocks around each, of which a std::unordered_map would make its greatest part.
 class BlockIndex {
 public:
-    void reserve(std::size_t n) { at_.reserve(n); }
-    void set(const Block& b, int value) { at_[key_of(b)] = value; }
-    /// The value set for this block, or -1.
-    int operator[](const Block& b) const
+    void reserve(std::size_t n)
     {
-        const auto found = at_.find(key_of(b));
-        return found == at_.end() ? -1 : found->second;
+        std::size_t size = 16;
+        while (size < 2 * n) size *= 2;
+        if (size <= slot_.size()) return;
+        std::vector<Slot> old(size);
+        old.swap(slot_);
+        for (const Slot& p : old)
+            if (p.value >= 0) slot_[where(p.key)] = p;
     }
+    /// Values are not negative.
+    void set(const Block& b, int value)
+    {
+        reserve(count_ + 1);
+        Slot& p = slot_[where(key_of(b))];
+        count_ += p.value < 0;
+        p = {key_of(b), value};
+    }
+    /// The value set for this block, or -1.
+    int operator[](const Block& b) const { return of_key(key_of(b)); }
+    int of_key(std::uint64_t key) const { return slot_.empty() ? -1 : slot_[where(key)].value; }
 
 private:
-    std::unordered_map<std::uint64_t, int> at_;
+    struct Slot {
+        std::uint64_t key = 0;
+        int value = -1;
+    };
+    /// The slot of this key, or the empty one where it belongs.
+    std::size_t where(std::uint64_t key) const
+    {
+        std::size_t k = mix(key) & (slot_.size() - 1);
+        while (slot_[k].value >= 0 && slot_[k].key != key) k = (k + 1) & (slot_.size() - 1);
+        return k;
+    }
+    std::vector<Slot> slot_;
+    std::size_t count_ = 0;
 };
 
 /// What a block costs: `work` in any unit (seconds, pairs x cost), and its soil particles.

@@ -32,7 +32,7 @@ public:
 
 private:
     static constexpr double noticeable = 0.02; // idle share below which imbalance is noise
-    static constexpr int settling = 5;         // calls after a new cut that show what it achieved; the first is cold
+    static constexpr int settling = 3;         // calls after a new cut that show what it achieved; the first is cold
     double floor_;                             // idle share that the present cut started from
     double cost_;                              // s
     double idle_ = 0;                          // s

@@ -1,6 +1,7 @@
 #pragma once
 // Which block a part can spare best: for the serial cut of all blocks and for a rank that knows only those around it.
 #include "decomposition/partition.hpp"
+#include <algorithm>
 
 namespace kuzure {
 
@@ -30,5 +31,58 @@ RimBlock best_rim_block(const BlockGraph& g, std::span<const int> part, int from
     }
     return best;
 }
+
+/// The same for many choices one after the other, of which each changes little: what each block could do is kept, and only that of the
+/// neighbours of a block that goes is judged anew.
+class RimChoices {
+public:
+    /// All must outlive it. `ties` as above.
+    RimChoices(const BlockGraph& g, std::span<const int> part, int from, std::span<const int> members, std::vector<double>& ties)
+        : g_(g), part_(part), from_(from), members_(members), ties_(ties), choices_(members.size()), number_(std::size_t(g.size()), -1)
+    {
+        for (std::size_t k = 0; k < members.size(); ++k) number_[members[k]] = int(k), judge(k);
+    }
+    template <class May> RimBlock best(May may) const
+    {
+        RimBlock best;
+        for (std::size_t k = 0; k < members_.size(); ++k)
+            for (const auto& c : choices_[k])
+                if ((best.block < 0 || c.gain > best.gain) && may(members_[k], c.to)) best = {members_[k], c.to, c.gain};
+        return best;
+    }
+    /// After part[b] of a member has changed.
+    void changed(int b)
+    {
+        judge(std::size_t(number_[b]));
+        for (const auto& l : g_.links(b))
+            if (const int k = number_[l.block]; k >= 0) judge(std::size_t(k));
+    }
+
+private:
+    struct Choice {
+        int to;
+        double gain;
+    };
+    void judge(std::size_t k)
+    {
+        const int b = members_[k];
+        auto& mine = choices_[k];
+        mine.clear();
+        if (part_[b] != from_ || g_.work[b] <= 0) return;
+        for (const auto& l : g_.links(b)) ties_[part_[l.block]] += l.bytes;
+        for (const auto& l : g_.links(b)) {
+            const int q = part_[l.block];
+            if (q != from_ && std::ranges::find(mine, q, &Choice::to) == mine.end()) mine.push_back({q, ties_[q] - ties_[from_]});
+        }
+        for (const auto& l : g_.links(b)) ties_[part_[l.block]] = 0;
+    }
+    const BlockGraph& g_;
+    std::span<const int> part_;
+    int from_;
+    std::span<const int> members_;
+    std::vector<double>& ties_;
+    std::vector<std::vector<Choice>> choices_; // of each member, in the order of its links
+    std::vector<int> number_;                  // of each block among the members, or -1
+};
 
 } // namespace kuzure

@@ -118,9 +118,9 @@ struct Cloud {
         if (std::ranges::any_of(soils, [](const Material& m) { return m.remembers > 0; })) particles.require(field::opened_volume);
         model.start(particles);
         sort();
+        model.set_walls(scene, walls);
         build(model.cluster_width(), skin);
         model.make_records(particles, soils, {});
-        model.set_walls(scene, walls);
     }
     /// One whole step over all clusters.
     PassResult step(PairModel& model, const StepInput& in)

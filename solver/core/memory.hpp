@@ -78,4 +78,23 @@ template <class T> struct HugePages {
 /// Uninitialised when resized.
 template <class T> using Array = std::vector<T, HugePages<T>>;
 
+/// What an array gets beyond what it needs, so that one that grows little by little is not moved each time: std::vector would take twice.
+inline std::size_t with_slack(std::size_t n) { return n + n / 32; }
+/// A size close to the memory behind it.
+template <class A> void resize_closely(A& a, std::size_t n)
+{
+    if (n > a.capacity()) a.reserve(2 * a.size() < n ? n : with_slack(n)); // so much more was not growth
+    a.resize(n);
+}
+/// The same where what was there is not wanted any more: never twice in memory.
+template <class A> void resize_anew(A& a, std::size_t n)
+{
+    if (n > a.capacity()) {
+        const bool grows = 2 * a.size() >= n;
+        a = A();
+        a.reserve(grows ? with_slack(n) : n);
+    }
+    a.resize(n);
+}
+
 } // namespace kuzure

@@ -76,7 +76,7 @@ public:
         for_each_column([&](auto& column) {
             using T = typename std::remove_reference_t<decltype(column)>::value_type;
             const auto old = std::min(size_, n);
-            column.resize(std::size_t(n) + padding);
+            resize_closely(column, std::size_t(n) + padding);
             std::fill(column.begin() + old, column.end(), T{});
         });
         size_ = n;
@@ -85,17 +85,23 @@ public:
     /// New particle k is old particle order[k]; order may be shorter or longer than size().
     void gather(std::span<const Index> order)
     {
+        const Index n = Index(order.size());
+        const std::size_t length = order.size() + padding;
         for_each_column([&](auto& column) {
-            auto& spare = this->spare<typename std::remove_reference_t<decltype(column)>::value_type>();
-            spare.resize(order.size() + padding);
-            const Index n = Index(order.size());
-#pragma omp parallel for schedule(static) if (n > 4096)
-            for (Index k = 0; k < n; ++k) spare[k] = column[order[k]];
-            // a register that reaches beyond the last particle sees it again: no zero to divide by
-            std::fill(spare.begin() + n, spare.end(), n > 0 ? spare[n - 1] : 0);
-            column.swap(spare);
+            using T = typename std::remove_reference_t<decltype(column)>::value_type;
+            resize_anew(spare_, length);
+            if constexpr (std::is_same_v<T, double>) {
+                put_in_order(column.data(), order, spare_.data());
+                column.swap(spare_);
+            } else { // there and back: whole numbers have no spare column of their own
+                static_assert(sizeof(T) <= sizeof(double) && std::is_trivial_v<T>);
+                T* const there = reinterpret_cast<T*>(spare_.data());
+                put_in_order(column.data(), order, there);
+                resize_anew(column, length);
+                std::memcpy(column.data(), there, length * sizeof(T));
+            }
         });
-        size_ = Index(order.size());
+        size_ = n;
     }
 
     /// Bytes of one particle over all present fields.
@@ -105,6 +111,14 @@ public:
         for_each_present([&](auto f) { n += sizeof(typename decltype(f)::Number) * f.components; });
         return n;
     }
+    /// Bytes of all columns, and of the one that is spare.
+    std::size_t bytes() const
+    {
+        std::size_t b = 0;
+        for_each_column([&](const auto& c) { b += c.capacity() * sizeof c[0]; });
+        return b;
+    }
+    std::size_t spare_bytes() const { return spare_.capacity() * sizeof(double); }
     /// Append these particles' fields to a byte buffer, particle by particle: the form in which they migrate.
     void pack(std::span<const Index> which, std::vector<std::byte>& out) const
     {
@@ -174,11 +188,18 @@ private:
             for (const auto& c : columns<decltype(f)>()) visit(c);
         });
     }
-    template <class T> Array<T>& spare() { return std::get<Array<T>>(spare_); }
+    template <class T> static void put_in_order(const T* column, std::span<const Index> order, T* to)
+    {
+        const Index n = Index(order.size());
+#pragma omp parallel for schedule(static) if (n > 4096)
+        for (Index k = 0; k < n; ++k) to[k] = column[order[k]];
+        // a register that reaches beyond the last particle sees it again: no zero to divide by
+        std::fill(to + n, to + n + padding, n > 0 ? to[n - 1] : T{});
+    }
 
     Index size_ = 0;
     StorageOf<AllFields>::type storage_;
-    std::tuple<Array<double>, Array<std::int64_t>, Array<std::int32_t>> spare_;
+    Array<double> spare_; // where gather() puts a column
 };
 
 } // namespace kuzure

@@ -165,12 +165,12 @@ protected:
     template <class R>
     KUZURE_INLINE std::span<const Index> near(const Cluster<V>& i, const StepInput& in, Index cluster, const R* records) const
     {
-        const auto pruned = in.lists->pruned(cluster);
-        if (in.prune || pruned.n < 0) {
+        auto& lists = *in.lists;
+        if (in.prune || !lists.is_pruned(cluster)) {
             const double reach = 2 * model_.kernel.h + in.margin / unit_;
-            pruned.n = kuzure::prune(i, in.lists->soil(cluster), records, reach, pruned.entries);
+            lists.keep_pruned(cluster, kuzure::prune(i, lists.soil(cluster), records, reach, lists.pruning_room()));
         }
-        return {pruned.entries, std::size_t(pruned.n)};
+        return lists.pruned(cluster);
     }
     /// Lengths of the pair loops, in every lane: the support and its square; (0.01 h^2) and what stands for r^2 where two coincide.
     struct Lengths {

@@ -50,8 +50,7 @@ private:
         Cluster<V> i = Below::cluster_at(in, cluster, counted_before);
         if (i.moving == 0) return;
         i.position = positions_of<V>(kinematics_.data(), i.first);
-        const auto pruned = in.lists->pruned(cluster);
-        const std::span<const Index> near(pruned.entries, std::size_t(pruned.n));
+        const auto near = in.lists->pruned(cluster);
         ForceSums<Wide> sums;
         // every particle meets itself once in its list
         tally.pairs +=
@@ -138,8 +137,8 @@ private:
 
     /// Returns the wall pairs inside the support; sigma: what walls mirror of each lane's stress.
     template <bool moving>
-    [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
-                                                   const Sym3<V>& sigma, ForceWalls<Wide>& out, WallPower<Wide>* power_out) const
+    [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, const WallList& runs, const Sym3<V>& sigma,
+                                                   ForceWalls<Wide>& out, WallPower<Wide>* power_out) const
     {
         const Vec3<V> velocity = Below::velocity_of(in, i);
         ForceWalls<V> sums{};

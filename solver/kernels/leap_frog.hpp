@@ -55,10 +55,16 @@ public:
             p[field::half_stress].set(i, p[field::stress][i]);
         }
     }
-    std::size_t bytes() const override
+    std::size_t record_memory() const override
     {
         return (now_.capacity() + next_.capacity()) * sizeof(Record<T>) +
-               (tension_.capacity() + next_tension_.capacity()) * sizeof(Tension<T>) + wall_bytes();
+               (tension_.capacity() + next_tension_.capacity()) * sizeof(Tension<T>);
+    }
+    std::size_t wall_memory() const override
+    {
+        std::size_t b = 0;
+        for (const auto& w : walls_) b += w.x.size() * 3 * sizeof(w.x[0]);
+        return b;
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
@@ -66,9 +72,9 @@ public:
         const Index n = p.size();
         const std::size_t count = std::size_t(n) + ghost_soil.size() + Particles::padding + 1;
         n_ = n;
-        now_.resize(count), next_.resize(count);
+        resize_anew(now_, count), resize_anew(next_, count);
         const bool sleepy = p.has(field::activity);
-        if (M::tensile) tension_.resize(count), next_tension_.resize(count);
+        if (M::tensile) resize_anew(tension_, count), resize_anew(next_tension_, count);
 #pragma omp parallel for schedule(static)
         for (Index i = 0; i < n; ++i) {
             const Material& m = soils[p[field::soil][i]];
@@ -85,7 +91,7 @@ public:
             if (M::tensile) tension_[k] = next_tension_[k] = {};
         }
     }
-    void set_walls(const Scene& scene, std::span<const WallPoints> points) override
+    void set_walls(const Scene& scene, std::span<WallPoints> points) override
     {
         walls_.resize(points.size());
         for (std::size_t w = 0; w < points.size(); ++w) {
@@ -118,13 +124,6 @@ public:
     }
 
 private:
-    std::size_t wall_bytes() const
-    {
-        std::size_t b = 0;
-        for (const auto& w : walls_) b += w.x.size() * 3 * sizeof(w.x[0]);
-        return b;
-    }
-
     KUZURE_INLINE void one_cluster(const StepInput& in, Index cluster, Tally<U>& tally)
     {
         Cluster<V> i = Base::cluster_at(in, cluster, tally);
@@ -149,7 +148,7 @@ private:
     {
         std::copy_n(now_.data() + first, count, next_.data() + first);
         if constexpr (M::tensile) std::copy_n(tension_.data() + first, count, next_tension_.data() + first);
-        if (in.prune) in.lists->pruned(cluster).n = -1;
+        if (in.prune) in.lists->forget_pruned(cluster);
     }
 
     /// Adds the pairs with soil; returns those inside the support. Entries of the list beyond it add exact zeros.
@@ -209,31 +208,28 @@ private:
     }
 
     /// Adds the walls' share to the sums of a cluster; returns the pairs inside the support.
-    [[gnu::noinline]] std::int64_t sum_over_walls(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, WideSums& out,
+    [[gnu::noinline]] std::int64_t sum_over_walls(const StepInput& in, const Cluster<V>& i, const WallList& runs, WideSums& out,
                                                   WallShare<W>& share) const
     {
         const Mirrored law;
         const auto [support, support2, softening, tiny] = Base::lengths();
         const V zero(T(0));
         std::int64_t pairs = 0;
-        while (!runs.empty()) {
-            const Index number = runs[0];
+        runs.for_each([&](int number, const PointSet& points) {
             const MirroredWall<T>& wall = walls_[number];
-            const auto list = runs.subspan(2, runs[1]);
-            runs = runs.subspan(2 + runs[1]);
             const Contacts at = contacts_with(wall.wall, in, i);
             Vec3<V> G{zero, zero, zero}, B = G, P = G;
-            for (const Index point : list) {
+            points.for_each([&](std::size_t point) __attribute__((always_inline)) {
                 const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]);
                 const V r2_exact = dot(r, r), r2 = max(r2_exact, tiny);
                 const unsigned hits = bits(less(r2_exact, support2)) & i.owned;
-                if (!hits) continue;
+                if (!hits) return;
                 pairs += std::popcount(hits & i.moving);
                 const V rho_sum = i.rho + i.rho;
                 const auto inv = roots<M::Kernel::divides>(r2, (r2 + softening) * rho_sum);
                 const V w = model_.kernel.F(max(support - inv.root, zero), inv.root, inv.inverse_root);
                 const Vec3<V> g = w * r;
-                const V factor = law.factor(WallPoint<V>{r, number, point}, at.wall);
+                const V factor = law.factor(WallPoint<V>{r, Index(number), Index(point)}, at.wall);
                 G = G + g;
                 B = fma(factor, g, B);
                 if constexpr (M::viscous) {
@@ -241,7 +237,7 @@ private:
                     const V pressure = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, i.rho, i.c, i.c});
                     P = fma(pressure, g, P);
                 }
-            }
+            });
             double sums[9][W];
             const V* members[] = {&G.x, &G.y, &G.z, &B.x, &B.y, &B.z, &P.x, &P.y, &P.z};
             for (int k = 0; k < 9; ++k) store_wide(sums[k], *members[k]);
@@ -251,7 +247,7 @@ private:
                 };
                 feel_wall(wall.wall, in, i.first + k, at.contact[k], of(0), of(3), of(6), k, out, share);
             }
-        }
+        });
         return pairs;
     }
     /// How the lanes of a cluster touch one wall.

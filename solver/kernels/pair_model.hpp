@@ -116,8 +116,9 @@ public:
 
     /// Records of owned particles, from their columns, and room for so many ghosts of these soils.
     virtual void make_records(const Particles&, std::span<const Material>, std::span<const std::int32_t> ghost_soil) = 0;
-    /// The wall points near this rank's soil; the scene must outlive the model's use.
-    virtual void set_walls(const Scene&, std::span<const WallPoints>) = 0;
+    /// The wall points near this rank's soil, which must outlive the model's use as the scene must. Those that this model has no use for
+    /// are taken away: lists are made of what is left.
+    virtual void set_walls(const Scene&, std::span<WallPoints>) = 0;
     /// Walls as they stand in the stage to come, where some move.
     virtual void place_walls(const WallStep&) {}
 
@@ -137,8 +138,9 @@ public:
     /// The strengths of effects are those of this scene from now on; which there are stays as it was.
     virtual void renew(const scene::Interactions&) = 0;
 
-    /// Bytes of its arrays.
-    virtual std::size_t bytes() const = 0;
+    /// Bytes of the records it holds, and of what it keeps of walls.
+    virtual std::size_t record_memory() const = 0;
+    virtual std::size_t wall_memory() const = 0;
 };
 
 /// Bytes of the ghost records of one particle in a whole step.

@@ -2,11 +2,13 @@
 // Records of the staggered scheme: what the pair loops of its stages read of a neighbour, their ghosts and the walls. A stage reads
 // of neighbours only what the other one wrote, strain the kinematics and force the stresses beside positions, so no record is
 // buffered twice.
+#include "solver/core/mix.hpp"
 #include "solver/kernels/cluster_pass.hpp"
 #include "solver/scene/ground.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/scene.hpp"
 #include "solver/walls/adjoint.hpp"
+#include <unordered_map>
 
 namespace kuzure {
 
@@ -58,24 +60,29 @@ public:
         if (coulomb) p.require(field::wall_slip, field::wall_pressure, field::wall_friction);
     }
     void start(Particles&) const override {}
-    std::size_t bytes() const override
+    std::size_t record_memory() const override
     {
         return kinematics_.capacity() * sizeof(Kinematics<T>) + stresses_.capacity() * sizeof(Stresses<T>) +
                tension_.capacity() * sizeof(Tension<T>) + shifts_.capacity() * sizeof(ShiftOf<T>) +
-               tractions_.capacity() * sizeof(Traction<T>) + affine_.capacity() * sizeof(Affine<T>) + speed_.capacity() * sizeof(T) +
-               wall_bytes();
+               tractions_.capacity() * sizeof(Traction<T>) + affine_.capacity() * sizeof(Affine<T>) + speed_.capacity() * sizeof(T);
+    }
+    std::size_t wall_memory() const override
+    {
+        std::size_t b = moving_points_.capacity() * sizeof(MovingPoint) + moving_faces_.capacity() * sizeof(MovingFace);
+        for (const auto& w : walls_) b += w.bytes();
+        return b;
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
     {
         const Index n = n_ = p.size();
         const std::size_t count = std::size_t(n) + ghost_soil.size() + Particles::padding + 1;
-        kinematics_.resize(count), stresses_.resize(count);
-        if (M::tensile) tension_.resize(count);
-        if (shifting()) shifts_.resize(count);
-        if (adjoint()) tractions_.resize(count);
+        resize_anew(kinematics_, count), resize_anew(stresses_, count);
+        if (M::tensile) resize_anew(tension_, count);
+        if (shifting()) resize_anew(shifts_, count);
+        if (adjoint()) resize_anew(tractions_, count);
         if (controls()) affine_.assign(count, {}); // the strain of each step writes them
-        if (soils.size() > 1) speed_.resize(count);
+        if (soils.size() > 1) resize_anew(speed_, count);
         const bool sleepy = p.has(field::activity);
 #pragma omp parallel for schedule(static)
         for (Index i = 0; i < n; ++i) {
@@ -103,39 +110,15 @@ public:
             std::fill(speed_.begin() + n + ghost_soil.size(), speed_.end(), T(1));
         }
     }
-    void set_walls(const Scene& scene, std::span<const WallPoints> points) override
+    void set_walls(const Scene& scene, std::span<WallPoints> points) override
     {
         const WallSurface surface(scene);
-        walls_.assign(points.size(), {}), moving_points_.clear(), moving_faces_.clear();
+        walls_.clear(), walls_.resize(points.size()), moving_points_.clear(), moving_faces_.clear();
         std::vector<bool> moves(scene.walls.size());
         for (const int w : scene::moving_walls(scene)) moves[std::size_t(w)] = true;
         for (std::size_t w = 0; w < points.size(); ++w) {
-            auto& to = walls_[w];
-            const Index n = Index(points[w].x.size());
-            to.x.resize(n), to.y.resize(n), to.z.resize(n), to.first.assign(std::size_t(n) + 1, 0);
-            std::vector<std::vector<Face>> found(n);
-#pragma omp parallel for schedule(dynamic, 256)
-            for (Index k = 0; k < n; ++k) {
-                to.x[k] = fixed_(points[w].x[k]), to.y[k] = fixed_(points[w].y[k]), to.z[k] = fixed_(points[w].z[k]);
-                surface.faces({points[w].x[k], points[w].y[k], points[w].z[k]}, 2 * h_, found[k]);
-            }
-            for (Index k = 0; k < n; ++k) {
-                const Vector at{points[w].x[k], points[w].y[k], points[w].z[k]};
-                const int own = points[w].wall;
-                if (moves[std::size_t(own)]) moving_points_.push_back({w, k, own, at});
-                for (const Face& f : found[k]) {
-                    const scene::Wall& wall = scene.walls[f.wall];
-                    if (moves[std::size_t(own)] || moves[std::size_t(f.wall)])
-                        moving_faces_.push_back({w, to.faces.size(), own, f.wall, at, f});
-                    const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
-                    to.faces.push_back({T(f.normal.x), T(f.normal.y), T(f.normal.z), T(f.depth / unit_),
-                                        T(wall.surface == scene::Surface::Rough), T(coulomb),
-                                        T(coulomb ? std::tan(scene::friction_angle_at(wall, f.foot(at))) : 0), T(0),
-                                        T(std::holds_alternative<scene::Ground>(wall.shape)), T(wall.drag), T(f.tied)});
-                }
-                to.first[k + 1] = Index(to.faces.size());
-                if (to.first[k + 1] > to.first[k]) to.faces.back().last = T(1);
-            }
+            take_faces(scene, moves, w, points[w], surface);
+            take_positions(points[w], moves[std::size_t(points[w].wall)], walls_[w]);
         }
         if (scene::any_wall_moves(scene))
             for (auto& w : walls_) w.motion.assign(w.faces.size(), {});
@@ -144,17 +127,18 @@ public:
     {
         for (const auto& p : moving_points_) {
             const Vector x = step.position(p.wall, p.x);
-            auto& to = walls_[p.record];
-            to.x[p.point] = fixed_(x.x), to.y[p.point] = fixed_(x.y), to.z[p.point] = fixed_(x.z);
+            auto& to = walls_[p.record].made;
+            to[0][p.point] = fixed_(x.x), to[1][p.point] = fixed_(x.y), to[2][p.point] = fixed_(x.z);
         }
         for (const auto& f : moving_faces_) {
             const Vector x = step.position(f.own, f.x), foot = step.position(f.wall, f.face.foot(f.x)),
                          n = step.turned(f.wall, f.face.normal);
             const Vector v = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.velocity(w, at); });
             const Vector next = velocity_of(f.face, f.own, f.x, [&](int w, Vector at) { return step.next_velocity(w, at); });
-            auto& to = walls_[f.record].faces[f.number];
-            to.nx = T(n.x), to.ny = T(n.y), to.nz = T(n.z), to.depth = T(dot(foot - x, n) / unit_);
-            walls_[f.record].motion[f.number] = {T(v.x), T(v.y), T(v.z), T(next.x), T(next.y), T(next.z)};
+            auto& to = walls_[f.record];
+            auto& kind = to.kinds[std::size_t(to.faces[f.number].kind)]; // its own
+            kind.nx = T(n.x), kind.ny = T(n.y), kind.nz = T(n.z), to.faces[f.number].depth = T(dot(foot - x, n) / unit_);
+            to.motion[f.number] = {T(v.x), T(v.y), T(v.z), T(next.x), T(next.y), T(next.z)};
         }
     }
     void pack(int stage, Index owned, Vector shift, std::byte* to) const override
@@ -257,34 +241,91 @@ protected:
         return {narrow(0), narrow(1), narrow(2)};
     }
     static ShiftOf<T> shift_of(Vector w) { return {T(w.x), T(w.y), T(w.z), T(0)}; }
-    std::size_t wall_bytes() const
+    void take_positions(const WallPoints& points, bool moves, WallRecords<T>& to) const
     {
-        std::size_t b = 0;
-        for (const auto& w : walls_)
-            b += w.x.size() * 3 * sizeof(w.x[0]) + w.first.size() * sizeof(Index) + w.faces.size() * sizeof(FaceRecord<T>);
-        return b;
+        if constexpr (!single<V>)
+            if (!moves) { // in metres they are what the run has
+                to.x = points.x.data(), to.y = points.y.data(), to.z = points.z.data();
+                return;
+            }
+        const Array<double>* from[] = {&points.x, &points.y, &points.z};
+        for (int a = 0; a < 3; ++a) {
+            to.made[a].resize(from[a]->size());
+            for (std::size_t k = 0; k < from[a]->size(); ++k) to.made[a][k] = fixed_((*from[a])[k]);
+        }
+        to.x = to.made[0].data(), to.y = to.made[1].data(), to.z = to.made[2].data();
+    }
+    /// The faces of a wall's points; those without any, deep in the wall, are taken away.
+    void take_faces(const Scene& scene, const std::vector<bool>& moves, std::size_t number, WallPoints& points, const WallSurface& surface)
+    {
+        auto& to = walls_[number];
+        const int own = points.wall;
+        const PointFaces found(surface, points.x, points.y, points.z, 2 * h_);
+        std::vector<bool> exposed(found.size());
+        for (std::size_t k = 0; k < found.size(); ++k) exposed[k] = !found[k].empty();
+        to.faces.reserve(found.faces());
+        to.first.reserve(std::size_t(std::ranges::count(exposed, true)) + 1);
+        to.first.push_back(0);
+        std::unordered_map<std::uint64_t, Index> known; // kinds by what they are mixed to; two that share it are two of each
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            if (!exposed[k]) continue;
+            const Vector at{points.x[k], points.y[k], points.z[k]};
+            if (moves[std::size_t(own)]) moving_points_.push_back({number, Index(to.first.size() - 1), own, at});
+            for (const Face& f : found[k]) {
+                const scene::Wall& wall = scene.walls[f.wall];
+                const bool moving = moves[std::size_t(own)] || moves[std::size_t(f.wall)];
+                if (moving) moving_faces_.push_back({number, to.faces.size(), own, f.wall, at, f});
+                const bool coulomb = wall.surface == scene::Surface::Coulomb && wall.friction_angle > 0; // else it is smooth
+                const FaceKind<T> kind{T(f.normal.x),
+                                       T(f.normal.y),
+                                       T(f.normal.z),
+                                       T(wall.surface == scene::Surface::Rough),
+                                       T(coulomb),
+                                       T(coulomb ? std::tan(scene::friction_angle_at(wall, f.foot(at))) : 0),
+                                       T(std::holds_alternative<scene::Ground>(wall.shape)),
+                                       T(wall.drag)};
+                to.faces.push_back({T(f.depth / unit_), moving ? add_kind(to, kind) : kind_like(to, kind, known), 0, f.tied});
+            }
+            to.first.push_back(Index(to.faces.size()));
+            to.faces.back().last = 1;
+        }
+        to.kinds.shrink_to_fit();
+        points.keep(exposed);
+    }
+    static Index add_kind(WallRecords<T>& to, const FaceKind<T>& kind)
+    {
+        to.kinds.push_back(kind);
+        return Index(to.kinds.size() - 1);
+    }
+    static Index kind_like(WallRecords<T>& to, const FaceKind<T>& kind, std::unordered_map<std::uint64_t, Index>& known)
+    {
+        std::uint64_t bits[sizeof kind / 8], key = 0; // by bits: zeros have signs
+        static_assert(sizeof bits == sizeof kind);
+        std::memcpy(bits, &kind, sizeof kind);
+        for (const std::uint64_t b : bits) key = mix(key ^ b);
+        const auto [at, fresh] = known.try_emplace(key, Index(to.kinds.size()));
+        if (!fresh && std::memcmp(&to.kinds[std::size_t(at->second)], &kind, sizeof kind) == 0) return at->second;
+        return add_kind(to, kind);
     }
 
     /// Visits the wall points inside the support: visit(r, r^2, lanes that they hit, mirror); `back` is taken off the positions.
     template <bool moving, class Visit>
-    KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, std::span<const Index> runs, Vec3<V> back, Visit visit) const
+    KUZURE_INLINE void for_each_wall_pair(const Cluster<V>& i, const WallList& near, Vec3<V> back, Visit visit) const
     {
         const auto [support, support2, softening, tiny] = Base::lengths();
         const V ramp(T(face_ramp * h_ / unit_));
-        while (!runs.empty()) {
-            const WallRecords<T>& wall = walls_[runs[0]];
-            const auto list = runs.subspan(2, runs[1]);
-            runs = runs.subspan(2 + runs[1]);
-            for (const Index point : list) {
+        near.for_each([&](int number, const PointSet& points) __attribute__((always_inline)) {
+            const WallRecords<T>& wall = walls_[number];
+            points.for_each([&](std::size_t point) __attribute__((always_inline)) {
                 const Vec3<V> r = i.position.minus(wall.x[point], wall.y[point], wall.z[point]) - back;
                 const V r2 = dot(r, r);
                 const unsigned hits = bits(less(r2, support2)) & i.owned;
-                if (!hits || wall.first[point] == wall.first[point + 1]) continue;
+                if (!hits) return;
                 const FaceMotion<T>* motion = nullptr;
                 if constexpr (moving) motion = &wall.motion[wall.first[point]];
-                visit(r, max(r2, tiny), hits, mirror<moving>(Law{}, r, &wall.faces[wall.first[point]], ramp, motion));
-            }
-        }
+                visit(r, max(r2, tiny), hits, mirror<moving>(Law{}, r, &wall.faces[wall.first[point]], wall.kinds.data(), ramp, motion));
+            });
+        });
     }
     /// Work of moving walls on soil that goes through `account`, from its power (W) in the half step before and in the one to come: what
     /// they give is no part of what that took.

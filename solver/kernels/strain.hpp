@@ -54,7 +54,7 @@ private:
     {
         Cluster<V> i = Below::cluster_at(in, cluster, tally);
         if (i.moving == 0) { // its list is pruned when it wakes
-            if (in.prune) in.lists->pruned(cluster).n = -1;
+            if (in.prune) in.lists->forget_pruned(cluster);
             if (Below::controls()) std::fill_n(&Below::affine_[i.first], i.count, Affine<T>{});
             return;
         }
@@ -143,7 +143,7 @@ private:
     }
 
     template <bool moving>
-    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs, StrainWalls<Wide>& out,
+    [[gnu::noinline]] void sum_wall_strain(const StepInput& in, const Cluster<V>& i, const WallList& runs, StrainWalls<Wide>& out,
                                            ViscousPower<Wide>* power_out) const
     {
         const V half_dt(T(0.5 * in.dt / unit_));

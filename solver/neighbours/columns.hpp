@@ -26,7 +26,7 @@ struct Columns {
 struct ColumnSort {
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0; // columns [x0, x0 + nx) x [y0, y0 + ny)
     std::vector<Index> start;                    // nx * ny + 1: first sorted index of each column, y slowest
-    Array<Index> order;                          // sorted index -> index in the input
+    Array<Index> order;                          // sorted index -> index in the input; may be given up when it has been followed
 
     /// Sorted indices of column (cx, cy); empty outside the range.
     std::pair<Index, Index> range(std::int32_t cx, std::int32_t cy) const
@@ -36,6 +36,7 @@ struct ColumnSort {
         const std::size_t c = std::size_t(y) * nx + x;
         return {start[c], start[c + 1]};
     }
+    std::size_t bytes() const { return (start.capacity() + order.capacity()) * sizeof(Index); }
 };
 
 /// Sorts points (x, y, z, id) of any number. Throws NumbersFailed if they spread over more columns than memory allows.

@@ -17,6 +17,28 @@ void WallPoints::sort(const Columns& c)
         v.swap(w);
     };
     permute(x), permute(y), permute(z), permute(id);
+    columns.order = {};
+}
+
+void WallPoints::keep(const std::vector<bool>& wanted)
+{
+    const std::size_t n = x.size();
+    Index kept = 0;
+    std::size_t column = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+        for (; column < columns.start.size() && std::size_t(columns.start[column]) <= k; ++column) columns.start[column] = kept;
+        if (!wanted[k]) continue;
+        x[kept] = x[k], y[kept] = y[k], z[kept] = z[k], id[kept] = id[k];
+        ++kept;
+    }
+    for (; column < columns.start.size(); ++column) columns.start[column] = kept;
+    for (auto* v : {&x, &y, &z}) v->resize(kept), v->shrink_to_fit();
+    id.resize(kept);
+}
+
+std::size_t WallPoints::bytes() const
+{
+    return (x.capacity() + y.capacity() + z.capacity()) * sizeof(double) + id.capacity() * sizeof(std::int64_t) + columns.bytes();
 }
 
 namespace {
@@ -28,14 +50,13 @@ constexpr int narrow = width<Narrow>;
 /// away, and its square still a float.
 struct Candidates {
     Array<float> x, y, z;
-    Array<Index> record;
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;
     std::vector<Index> start;
 
     void resize(Index n)
     {
-        x.resize(n + narrow), y.resize(n + narrow), z.resize(n + narrow), record.resize(n + narrow);
-        for (Index k = n; k < n + narrow; ++k) x[k] = y[k] = z[k] = 1e18f, record[k] = 0;
+        x.resize(n + narrow), y.resize(n + narrow), z.resize(n + narrow);
+        for (Index k = n; k < n + narrow; ++k) x[k] = y[k] = z[k] = 1e18f;
     }
     std::pair<Index, Index> range(std::int32_t cx, std::int32_t cy) const
     {
@@ -46,10 +67,12 @@ struct Candidates {
     }
 };
 
-/// Two sets in the global order become one; the second set's records follow the first's.
-Candidates merge(const SortedPoints& a, const SortedPoints& b, Vector origin)
+/// Two sets in the global order become one; the second set's records follow the first's. `record`: of each, none where the second set is.
+Candidates merge(const SortedPoints& a, const SortedPoints& b, Vector origin, Array<Index>& record_of)
 {
     Candidates m;
+    if (b.n > 0) resize_anew(record_of, std::size_t(a.n) + std::size_t(b.n));
+    else record_of = {};
     const auto &ca = *a.columns, &cb = *b.columns;
     const bool one = b.n == 0, other = a.n == 0;
     m.x0 = one ? ca.x0 : other ? cb.x0 : std::min(ca.x0, cb.x0);
@@ -68,7 +91,7 @@ Candidates merge(const SortedPoints& a, const SortedPoints& b, Vector origin)
     m.resize(a.n + b.n);
     const auto put = [&](Index at, const SortedPoints& s, Index from, Index record) {
         m.x[at] = float(s.x[from] - origin.x), m.y[at] = float(s.y[from] - origin.y), m.z[at] = float(s.z[from] - origin.z);
-        m.record[at] = record;
+        if (!record_of.empty()) record_of[at] = record;
     };
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::int64_t c = 0; c < std::int64_t(count); ++c) {
@@ -91,10 +114,7 @@ Candidates of_walls(const WallPoints& w, Vector origin)
     m.start = w.columns.start;
     const Index n = Index(w.x.size());
     m.resize(n);
-    for (Index k = 0; k < n; ++k) {
-        m.x[k] = float(w.x[k] - origin.x), m.y[k] = float(w.y[k] - origin.y), m.z[k] = float(w.z[k] - origin.z);
-        m.record[k] = k;
-    }
+    for (Index k = 0; k < n; ++k) m.x[k] = float(w.x[k] - origin.x), m.y[k] = float(w.y[k] - origin.y), m.z[k] = float(w.z[k] - origin.z);
     return m;
 }
 
@@ -107,21 +127,37 @@ struct Cluster {
     }
 };
 
-/// For each pattern of eight hits: the indices of those in front, and how many.
-struct Compress {
-    std::uint8_t at[256][8], count[256];
-    constexpr Compress() : at{}, count{}
+/// Writes a list: groups of candidates that follow each other, with a bit for each that is near.
+class Writer {
+public:
+    explicit Writer(Among* to) : to_(to) {}
+    void put(Index first, unsigned hits)
     {
-        for (int pattern = 0; pattern < 256; ++pattern) {
-            int n = 0;
-            for (int k = 0; k < 8; ++k)
-                if (pattern >> k & 1) at[pattern][n++] = std::uint8_t(k);
-            count[pattern] = std::uint8_t(n);
-            for (; n < 8; ++n) at[pattern][n] = 0;
-        }
+        if (hits == 0) return;
+        const unsigned ahead = unsigned(std::countr_zero(hits));
+        const Index at = first + Index(ahead);
+        hits >>= ahead;
+        if (open_ && at - to_->first < 32) {
+            const std::uint64_t all = std::uint64_t(hits) << (at - to_->first);
+            to_->which |= std::uint32_t(all);
+            if (const auto rest = std::uint32_t(all >> 32); rest != 0) begin(to_->first + 32, rest);
+        } else begin(at, hits);
     }
+    /// No group of now goes on after this.
+    void close() { to_ += std::exchange(open_, false); }
+    Among* end() const { return to_; }
+
+private:
+    void begin(Index first, std::uint32_t which)
+    {
+        close();
+        const int ahead = std::countr_zero(which);
+        *to_ = {first + ahead, which >> ahead};
+        open_ = true;
+    }
+    Among* to_;
+    bool open_ = false;
 };
-constexpr Compress compress;
 
 /// Candidates of one set for the clusters of one column, from the lowest to the highest: where their heights begin and end in each column
 /// around moves on by little from one cluster to the next.
@@ -144,50 +180,56 @@ public:
                 const float left = float(columns_.origin.x + x * columns_.width_x - origin_.x);
                 const float front = columns_.flat ? -1e30f : float(columns_.origin.y + y * columns_.width_y - origin_.y);
                 around_.push_back({left, left + float(columns_.width_x), front, columns_.flat ? 1e30f : front + float(columns_.width_y),
-                                   begin, end, begin, begin});
+                                   begin, end, begin, begin, false});
             }
     }
-    /// Appends what is within reach of the cluster's box, in the global order. `out` has `used` entries; returns the new count.
-    template <class Grow> std::size_t append(const Cluster& c, Array<Index>& out, std::size_t used, Grow grow)
+    /// Where candidates are for a cluster; returns how many words they take at most.
+    std::size_t seek(const Cluster& c)
     {
-        const Narrow zero(0.0f), reach2(reach_ * reach_);
-        const Narrow x0(c.lo[0]), x1(c.hi[0]), y0(c.lo[1]), y1(c.hi[1]), z0(c.lo[2]), z1(c.hi[2]);
         const float* z = m_.z.data();
+        std::size_t words = 0;
         for (Around& a : around_) {
             // distance of the cluster's box to the column, in plan
             const float dx = std::max({0.f, a.left - c.hi[0], c.lo[0] - a.right}),
                         dy = std::max({0.f, a.front - c.hi[1], c.lo[1] - a.back});
             const float height2 = reach_ * reach_ - dx * dx - dy * dy;
-            if (height2 <= 0) continue;
+            a.near = height2 > 0;
+            if (!a.near) continue;
             const float dz = std::sqrt(height2), low = c.lo[2] - dz, high = c.hi[2] + dz;
             while (a.begin > a.first && z[a.begin - 1] >= low) --a.begin;
             while (a.begin < a.last && z[a.begin] < low) ++a.begin;
             a.end = std::max(a.end, a.begin);
             while (a.end > a.begin && z[a.end - 1] > high) --a.end;
             while (a.end < a.last && z[a.end] <= high) ++a.end;
-            const std::size_t room = used + std::size_t(a.end - a.begin) + 16; // whole registers are written
-            if (out.size() < room) grow(room);
-            Index* to = out.data();
+            words += std::size_t(a.end - a.begin + 31) / 32;
+        }
+        return words;
+    }
+    /// Writes those within reach of the box of that cluster, in the global order.
+    Among* write(const Cluster& c, Among* out) const
+    {
+        const Narrow zero(0.0f), reach2(reach_ * reach_);
+        const Narrow x0(c.lo[0]), x1(c.hi[0]), y0(c.lo[1]), y1(c.hi[1]), z0(c.lo[2]), z1(c.hi[2]);
+        Writer to(out);
+        for (const Around& a : around_) {
+            if (!a.near) continue;
             for (Index q = a.begin; q < a.end; q += narrow) {
                 const Narrow x = load<Narrow>(&m_.x[q]), y = load<Narrow>(&m_.y[q]), h = load<Narrow>(&m_.z[q]);
                 const Narrow ax = max(max(x0 - x, x - x1), zero), ay = max(max(y0 - y, y - y1), zero), az = max(max(z0 - h, h - z1), zero);
                 unsigned hits = bits(less(fma(az, az, fma(ay, ay, ax * ax)), reach2));
                 if (a.end - q < narrow) hits &= (1u << (a.end - q)) - 1;
-                const Index* record = &m_.record[q];
-                for (int part = 0; part < narrow; part += 8, hits >>= 8) {
-                    const auto& at = compress.at[hits & 255];
-                    for (int k = 0; k < 8; ++k) to[used + std::size_t(k)] = record[part + at[k]];
-                    used += compress.count[hits & 255];
-                }
+                to.put(q, hits);
             }
+            to.close();
         }
-        return used;
+        return to.end();
     }
 
 private:
     struct Around { // a column: its sides in plan, all its candidates, and those of the last cluster's heights
         float left, right, front, back;
         Index first, last, begin, end;
+        bool near;
     };
     const Candidates& m_;
     const Columns& columns_;
@@ -204,12 +246,6 @@ std::vector<Index> cluster_starts(const ColumnSort& cols, int width)
     for (std::size_t c = 0; c < n_columns; ++c) start[c + 1] = start[c] + (cols.start[c + 1] - cols.start[c] + width - 1) / width;
     return start;
 }
-
-/// Where the lists of a cluster begin, in the stores of one thread.
-struct Stored {
-    int thread;
-    std::size_t soil, walls;
-};
 
 /// Where single-precision coordinates begin, the middle of the owned soil, and the reach (m) with slack for their rounding.
 struct Frame {
@@ -234,17 +270,10 @@ Cluster cluster_of(const SortedPoints& p, Index begin, Index end, Vector origin)
     return c;
 }
 
-/// The lists that one thread finds, one behind the other.
+/// What one thread finds.
 class ThreadLists {
-    static auto grower(Array<Index>& a)
-    {
-        return [&a](std::size_t need) { a.resize(std::max(need, a.size() + a.size() / 2 + 4096)); };
-    }
-
 public:
-    ThreadLists(const Candidates& soil, const std::vector<Candidates>& walls, const Columns& columns, const Frame& frame,
-                Array<Index>& soil_store, Array<Index>& wall_store)
-        : soil_(soil_store), walls_(wall_store)
+    ThreadLists(const Candidates& soil, const std::vector<Candidates>& walls, const Columns& columns, const Frame& frame)
     {
         finders_.emplace_back(soil, columns, frame.origin, frame.reach);
         for (const auto& w : walls) finders_.emplace_back(w, columns, frame.origin, frame.reach);
@@ -253,36 +282,35 @@ public:
     {
         for (auto& f : finders_) f.enter(cx, cy, rx, ry);
     }
-    std::size_t soil() const { return n_soil_; }
-    std::size_t walls() const { return n_walls_; }
-    std::span<const Index> append_soil(const Cluster& c)
+    struct Found {
+        const Among* list;
+        Index soil, walls; // words
+        std::size_t soil_points, wall_points;
+    };
+    /// Soil, and for each wall near by {its number, words} and those.
+    Found find(const Cluster& c, Arena<Among>& store)
     {
-        const std::size_t before = n_soil_;
-        n_soil_ = finders_[0].append(c, soil_, n_soil_, grower(soil_));
-        return {soil_.data() + before, soil_.data() + n_soil_};
-    }
-    /// Number of a wall, how many points, the points; for each wall near by. Returns how many points in all.
-    std::size_t append_walls(const Cluster& c)
-    {
-        std::size_t sum = 0;
+        std::size_t words = 0;
+        for (auto& f : finders_) words += 1 + f.seek(c);
+        Among* const list = store.room(words);
+        Among* const soil_end = finders_[0].write(c, list);
+        Among* end = soil_end;
+        std::size_t wall_points = 0;
         for (std::size_t w = 0; w + 1 < finders_.size(); ++w) {
-            if (walls_.size() < n_walls_ + 2) grower(walls_)(n_walls_ + 2);
-            const std::size_t head = n_walls_;
-            n_walls_ = finders_[w + 1].append(c, walls_, n_walls_ + 2, grower(walls_));
-            const std::size_t found = n_walls_ - head - 2;
-            if (found == 0) {
-                n_walls_ = head;
+            Among* const head = end;
+            end = finders_[w + 1].write(c, head + 1);
+            if (end == head + 1) {
+                end = head;
                 continue;
             }
-            walls_[head] = Index(w), walls_[head + 1] = Index(found);
-            sum += found;
+            *head = {Index(w), std::uint32_t(end - head - 1)};
+            wall_points += PointSet({head + 1, end}).size();
         }
-        return sum;
+        store.take(std::size_t(end - list));
+        return {list, Index(soil_end - list), Index(end - soil_end), PointSet({list, soil_end}).size(), wall_points};
     }
 
 private:
-    Array<Index>&soil_, &walls_;
-    std::size_t n_soil_ = 0, n_walls_ = 0;
     std::vector<Finder> finders_;
 };
 
@@ -297,26 +325,28 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
     const std::size_t n_columns = std::size_t(cols.nx) * cols.ny;
     const std::vector<Index> cluster_start = cluster_starts(cols, width);
     const Index n = cluster_start[n_columns];
-    first_.resize(n), count_.resize(n), soil_.resize(n), walls_.resize(n), n_soil_.resize(n), n_walls_.resize(n), pruned_.resize(n);
-    n_pruned_.resize(n);
+    for (auto* a : {&first_, &n_soil_, &n_walls_, &n_pruned_}) resize_anew(*a, std::size_t(n));
+    resize_anew(count_, std::size_t(n)), resize_anew(list_, std::size_t(n)), resize_anew(pruned_, std::size_t(n));
 
     const Frame frame = frame_of(owned, reach);
-    const Candidates soil = merge(owned, ghosts, frame.origin);
+    const Candidates soil = merge(owned, ghosts, frame.origin, record_);
     std::vector<Candidates> wall_points;
     for (const auto& w : walls) wall_points.push_back(of_walls(w, frame.origin));
 
     const int threads = omp_get_max_threads();
-    soil_store_.resize(threads), wall_store_.resize(threads), pruned_store_.resize(threads);
-    Array<Stored> stored(n);
+    store_.resize(threads), pruned_store_.resize(std::max(threads, omp_get_num_procs()));
+    std::size_t words = 0;
+    for (const auto& s : store_) words += s.taken();
+    for (auto& s : store_) s.clear((words ? words : std::size_t(n) * 21) / std::size_t(threads));
     std::vector<std::uint8_t> has_ghost(n, 0);
-    std::size_t entries = 0, wall_entries = 0;
+    std::size_t entries = 0, wall_entries = 0, longest = 0;
     const auto column_reach = [&](double w) { return std::int32_t(std::ceil(frame.reach / w)); };
     const std::int32_t rx = column_reach(columns.width_x), ry = columns.flat ? 0 : column_reach(columns.width_y);
 
-#pragma omp parallel num_threads(threads) reduction(+ : entries, wall_entries)
+#pragma omp parallel num_threads(threads) reduction(+ : entries, wall_entries) reduction(max : longest)
     {
         const int t = omp_get_thread_num();
-        ThreadLists lists(soil, wall_points, columns, frame, soil_store_[t], wall_store_[t]);
+        ThreadLists lists(soil, wall_points, columns, frame);
 #pragma omp for schedule(dynamic, 16)
         for (std::int64_t column = 0; column < std::int64_t(n_columns); ++column) {
             Index begin = cols.start[column];
@@ -325,37 +355,59 @@ void ClusterLists::build(const Columns& columns, const SortedPoints& owned, cons
             lists.enter(cols.x0 + std::int32_t(column % cols.nx), cols.y0 + std::int32_t(column / cols.nx), rx, ry);
             for (Index c = cluster_start[column]; c < cluster_start[column + 1]; ++c, begin += width) {
                 const int members = int(std::min<Index>(width, end - begin));
-                const Cluster cl = cluster_of(owned, begin, begin + members, frame.origin);
+                const auto found = lists.find(cluster_of(owned, begin, begin + members, frame.origin), store_[t]);
                 first_[c] = begin, count_[c] = std::int8_t(members);
-                stored[c] = {t, lists.soil(), lists.walls()};
-                const auto found = lists.append_soil(cl);
-                n_soil_[c] = Index(found.size()), entries += found.size();
-                has_ghost[c] = std::ranges::any_of(found, [&](Index j) { return j >= owned.n; });
-                wall_entries += lists.append_walls(cl);
-                n_walls_[c] = Index(lists.walls() - stored[c].walls);
+                list_[c] = found.list, n_soil_[c] = found.soil, n_walls_[c] = found.walls;
+                entries += found.soil_points, wall_entries += found.wall_points;
+                longest = std::max(longest, found.soil_points);
+                if (!record_.empty()) this->soil(c).for_each([&](Index j) { has_ghost[c] |= j >= std::size_t(owned.n); });
             }
         }
-        // Untouched until a thread of the pass writes it.
-        const std::size_t used = lists.soil();
-        if (pruned_store_[t].size() < used + narrow) pruned_store_[t].resize(used + used / 8 + narrow);
     }
-    entries_ = entries, wall_entries_ = wall_entries;
-    interior_.clear(), rim_.clear();
-    for (Index c = 0; c < n; ++c) {
-        soil_[c] = soil_store_[stored[c].thread].data() + stored[c].soil;
-        pruned_[c] = pruned_store_[stored[c].thread].data() + stored[c].soil;
-        walls_[c] = wall_store_[stored[c].thread].data() + stored[c].walls;
-        (has_ghost[c] ? rim_ : interior_).push_back(c);
-    }
+    entries_ = entries, wall_entries_ = wall_entries, longest_ = longest;
+    const auto rim = std::size_t(std::ranges::count(has_ghost, 1));
+    resize_anew(rim_, rim), resize_anew(interior_, std::size_t(n) - rim);
+    rim_.clear(), interior_.clear();
+    for (Index c = 0; c < n; ++c) (has_ghost[c] ? rim_ : interior_).push_back(c);
+    forget_pruned();
+}
+
+void ClusterLists::forget_pruned()
+{
+    std::fill(n_pruned_.begin(), n_pruned_.end(), -1);
+    std::size_t kept = 0;
+    for (const auto& s : pruned_store_) kept += s.taken();
+    for (auto& s : pruned_store_) s.clear((kept ? kept : entries_ / 2) / store_.size());
+}
+
+Index* ClusterLists::pruning_room()
+{
+    const auto t = std::size_t(omp_get_thread_num());
+    ensure(t < pruned_store_.size(), "lists are pruned by more threads than made them");
+    return pruned_store_[t].room(longest_);
+}
+
+void ClusterLists::keep_pruned(Index c, Index n)
+{
+    auto& store = pruned_store_[std::size_t(omp_get_thread_num())];
+    Index* const fresh = store.room(longest_);
+    if (n <= n_pruned_[c]) std::copy_n(fresh, n, pruned_[c]); // pruned once more: there is room where it was
+    else pruned_[c] = fresh, store.take(std::size_t(n));
+    n_pruned_[c] = n;
 }
 
 std::size_t ClusterLists::bytes() const
 {
-    std::size_t b = first_.capacity() * (sizeof(Index) * 4 + 1 + 3 * sizeof(void*));
-    for (const auto& s : soil_store_) b += s.capacity() * sizeof(Index);
-    for (const auto& s : pruned_store_) b += s.capacity() * sizeof(Index);
-    for (const auto& s : wall_store_) b += s.capacity() * sizeof(Index);
+    std::size_t b = first_.capacity() * (3 * sizeof(Index) + 1 + sizeof(void*)) + record_.capacity() * sizeof(Index);
+    for (const auto& s : store_) b += s.bytes();
     return b + (interior_.capacity() + rim_.capacity()) * sizeof(Index);
+}
+
+std::size_t ClusterLists::pruned_bytes() const
+{
+    std::size_t b = first_.capacity() * (sizeof(Index) + sizeof(void*));
+    for (const auto& s : pruned_store_) b += s.bytes();
+    return b;
 }
 
 } // namespace kuzure

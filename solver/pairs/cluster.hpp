@@ -65,17 +65,17 @@ template <class V, class R> Positions<V> positions_of(const R* records, Index fi
 }
 
 /// Keeps of a list, in its order, what is nearer than `reach` to any particle of the cluster; returns how many.
-template <class V, class R>
-KUZURE_INLINE Index prune(const Cluster<V>& i, std::span<const Index> list, const R* records, double reach, Index* kept)
+template <class V, class List, class R>
+KUZURE_INLINE Index prune(const Cluster<V>& i, const List& list, const R* records, double reach, Index* kept)
 {
     const V reach2(number<V>(reach * reach));
-    Index n = 0;
-    for (const Index k : list) {
+    std::size_t n = 0;
+    list.for_each([&](std::size_t k) __attribute__((always_inline)) {
         const Vec3<V> r = i.position.minus(records[k]);
-        kept[n] = k;
+        kept[n] = Index(k);
         n += (bits(less(dot(r, r), reach2)) & i.owned) != 0;
-    }
-    return n;
+    });
+    return Index(n);
 }
 
 /// Lanes that have an awake particle within the support (in the records' unit); `awake[k].awake` tells of record k.

@@ -4,30 +4,89 @@
 
 namespace kuzure {
 
+std::vector<double> pair_work(const ClusterLists& lists, const std::function<bool(Index, Index)>& meets,
+                              const std::function<bool(Index, int, Index)>& meets_wall, Index every)
+{
+    struct Met {
+        double entries = 0, pairs = 0; // entries: once for each particle of the cluster
+        double share() const { return entries > 0 ? pairs / entries : 0; }
+    };
+    Met soil, wall;
+#pragma omp parallel
+    {
+        Met my_soil, my_wall;
+#pragma omp for schedule(dynamic, 64) nowait
+        for (Index c = 0; c < lists.size(); c += every) {
+            const Index first = lists.first(c), last = first + lists.count(c);
+            lists.soil(c).for_each([&](Index j) {
+                my_soil.entries += last - first;
+                for (Index i = first; i < last; ++i) my_soil.pairs += j != i && meets(i, j);
+            });
+            lists.walls(c).for_each([&](int w, const PointSet& points) {
+                points.for_each([&](Index k) {
+                    my_wall.entries += last - first;
+                    for (Index i = first; i < last; ++i) my_wall.pairs += meets_wall(i, w, k);
+                });
+            });
+        }
+#pragma omp critical
+        {
+            soil.entries += my_soil.entries, soil.pairs += my_soil.pairs;
+            wall.entries += my_wall.entries, wall.pairs += my_wall.pairs;
+        }
+    }
+    const double of_soil = soil.share(), of_wall = StepWork::wall * wall.share();
+    std::vector<double> work(std::size_t(lists.size()));
+#pragma omp parallel for schedule(static)
+    for (Index c = 0; c < lists.size(); ++c)
+        work[std::size_t(c)] = lists.count(c) * (of_soil * double(lists.soil(c).size()) + of_wall * double(lists.walls(c).size()));
+    return work;
+}
+
 namespace {
-/// Blocks of this rank's particles and their costs; pairs are those of the last sort.
+/// Blocks of this rank's particles and their costs, by the pairs of the last sort.
 std::vector<BlockWork> block_work(const Scene& scene, const Domain& domain, const Particles& p, const Layout& layout)
 {
     const auto x = p[field::position], sorted = p[field::sorted_position];
+    const double support2 = scene.support() * scene.support();
+    const auto close = [&](Index i, Vector there) {
+        const Vector r = there - sorted[i];
+        return dot(r, r) < support2;
+    };
     const ClusterLists& lists = layout.lists();
-    const Index n = p.size();
-    const double support = scene.support(), support2 = support * support;
-    std::vector<StepWork> of(std::size_t(n), {1, -1, 0}); // every particle meets itself once in its list
-#pragma omp parallel for schedule(dynamic, 64)
-    for (Index c = 0; c < lists.size(); ++c)
-        for (Index i = lists.first(c); i < lists.first(c) + lists.count(c); ++i) {
-            const Vector here = sorted[i];
-            const auto close = [&](Vector there) { return dot(there - here, there - here) < support2; };
-            for (const Index j : lists.soil(c)) of[i].soil_pairs += close(layout.sorted(p, j));
-            for (auto runs = lists.walls(c); !runs.empty(); runs = runs.subspan(2 + runs[1])) {
-                const WallPoints& w = layout.walls()[runs[0]];
-                for (const Index k : runs.subspan(2, runs[1])) of[i].wall_pairs += close({w.x[k], w.y[k], w.z[k]});
+    const auto of_pairs = pair_work(
+        lists, [&](Index i, Index j) { return close(i, layout.sorted(p, j)); },
+        [&](Index i, int wall, Index k) {
+            const WallPoints& w = layout.walls()[std::size_t(wall)];
+            return close(i, {w.x[k], w.y[k], w.z[k]});
+        },
+        sampled_clusters);
+    // Each thread a share of its own, put together in their order: the same sums in every run on so many.
+    using Blocks = std::map<Block, BlockWork>;
+    std::vector<Blocks> by_thread(static_cast<std::size_t>(omp_get_max_threads()));
+#pragma omp parallel num_threads(int(by_thread.size()))
+    {
+        Blocks& mine = by_thread[std::size_t(omp_get_thread_num())];
+        BlockWork* last = nullptr; // most particles are in the block of the one before
+#pragma omp for schedule(static)
+        for (Index c = 0; c < lists.size(); ++c)
+            for (Index i = lists.first(c); i < lists.first(c) + lists.count(c); ++i) {
+                Block b;
+                if (!domain.space().raw_block(x[i], b)) continue; // all ranks hear of it when particles migrate
+                b = domain.space().wrapped(b);
+                if (!last || last->block != b) last = &mine.try_emplace(b, BlockWork{b, 0, 0}).first->second;
+                last->work += of_pairs[std::size_t(c)] / lists.count(c) + StepWork::particle;
+                last->particles += 1;
             }
+    }
+    Blocks blocks;
+    for (const Blocks& some : by_thread)
+        for (const auto& [b, w] : some) {
+            BlockWork& sum = blocks.try_emplace(b, BlockWork{b, 0, 0}).first->second;
+            sum.work += w.work, sum.particles += w.particles;
         }
-    std::map<Block, StepWork> blocks;
-    for (Index i = 0; i < n; ++i) blocks[domain.block_of(x[i])].add(of[i]);
     std::vector<BlockWork> work;
-    for (const auto& [b, w] : blocks) work.push_back({b, w.total(), double(w.particles)});
+    for (const auto& [b, w] : blocks) work.push_back(w);
     return work;
 }
 } // namespace
@@ -71,12 +130,15 @@ void Balance::cut_state(const Scene& scene, Particles& p, const Layout& layout, 
 void Balance::migrate(const Scene& scene, Particles& p, const Layout& layout, std::int64_t rebuilds, Timers& timers)
 {
     if (comm_.size() == 1) return;
+    const bool forced = recut_every_ > 0 && layout.built() && rebuilds % recut_every_ == 0;
+    if (!forced && layout.built() && ++stayed_ < rebuilds_a_migration) return; // who computes what has left its blocks changes no bit
+    stayed_ = 0;
     const double busy = timers.seconds(Phase::Interior) + timers.seconds(Phase::Rim);
     const bool due = layout.built() && rebalance_.due(comm_, busy - busy_before_);
     busy_since_cut_ += busy - busy_before_;
     busy_before_ = busy;
     imbalance_ = rebalance_.imbalance();
-    const bool now = due || (recut_every_ > 0 && layout.built() && rebuilds % recut_every_ == 0);
+    const bool now = due || forced;
     const double begin = omp_get_wtime();
     if (now) cut(scene, p, layout, timers);
     migrated_ += domain_.migrate(p).left;

@@ -5,8 +5,15 @@
 #include "perf/phases.hpp"
 #include "solver/run/blocks.hpp"
 #include "solver/run/layout.hpp"
+#include <functional>
 
 namespace kuzure {
+
+/// What the pairs of each cluster cost, in soil pairs: counted for one cluster in `every`, for the others by the length of their lists, of
+/// which a cluster's batches take the time. meets(particle, record), meets_wall(particle, wall, point): nearer than the support.
+std::vector<double> pair_work(const ClusterLists&, const std::function<bool(Index, Index)>& meets,
+                              const std::function<bool(Index, int, Index)>& meets_wall, Index every);
+inline constexpr Index sampled_clusters = 16;
 
 class Balance {
 public:
@@ -17,7 +24,7 @@ public:
     void cut_start(const Scene&, const scene::Filling&, Timers&);
     /// The first cut of a state whose particles lie on any rank; `rebuild` makes the lists by which pairs are counted. Collective.
     void cut_state(const Scene&, Particles&, const Layout&, bool has_run, const std::function<void()>& rebuild);
-    /// Before a sort: cuts anew if it pays, then sends every particle to its owner. Collective.
+    /// Before a sort; at every fourth, and where a cut is wanted: cuts anew if it pays, then sends every particle to its owner. Collective.
     void migrate(const Scene&, Particles&, const Layout&, std::int64_t rebuilds, Timers&);
 
     double imbalance() const { return imbalance_; } // max/mean of the ranks' busy seconds, as last measured
@@ -38,6 +45,10 @@ private:
     static constexpr double noise = 0.02; // of max/mean: below this, imbalance is noise
     static constexpr double ragged = 1.5; // times the halo of fresh parts
 
+    /// Soil that crosses into another rank's blocks moves there so late: by then it is a spacing or two beyond, which the halo takes as it
+    /// comes, and three of four exchanges with their barriers fall away.
+    static constexpr int rebuilds_a_migration = 4;
+
     const Comm& comm_;
     Domain& domain_;
     HaloCost halo_;
@@ -47,6 +58,7 @@ private:
     double cut_imbalance_ = 1, halo_share_ = 0;   // of the last cut
     double busy_before_ = 0, busy_since_cut_ = 0; // s
     double imbalance_ = 1;
+    int stayed_ = 0; // sorts since the last migration
     std::int64_t migrated_ = 0, cuts_ = 0, full_partitions_ = 0;
 };
 

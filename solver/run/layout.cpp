@@ -43,17 +43,21 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
                      Timers& timers, double way)
 {
     reach_ = std::max(list_reach(scene_), scene_.support() + way * (1 + 1e-6));
-    rethrow_on_all_ranks(comm, [&] {
+    std::string complaint;
+    try {
         timers.timed(Phase::Sort, [&] {
             const auto x = p[field::sorted_position];
             sorted_ = sort_into_columns(columns_, x.column[0], x.column[1], x.column[2], p[field::id].column[0], p.size());
             p.gather(sorted_.order);
+            sorted_.order = {};
         });
         // every column read and written once
         timers.did(Phase::Sort, 0, 2.0 * double(p.bytes_per_particle()) * double(p.size()));
-    });
+    } catch (const NumbersFailed& e) {
+        complaint = e.what(); // all ranks fail together, when the halo is planned
+    }
     timers.timed(Phase::Ghosts, [&] {
-        exchange_ghosts(comm, domain, p, model);
+        exchange_ghosts(comm, domain, p, model, complaint);
         renew_walls(p, model);
     });
     timers.timed(Phase::Lists, [&] {
@@ -70,12 +74,14 @@ void Layout::rebuild(const Comm& comm, const Domain& domain, Particles& p, std::
     built_ = true;
 }
 
-void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model)
+void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Particles& p, const PairModel& model,
+                             const std::string& complaint)
 {
     std::vector<std::size_t> ghost_bytes;
     for (const Stage& s : model.stages()) ghost_bytes.push_back(s.ghost_bytes);
-    halo_.emplace(comm, domain.plan_halo(p[field::sorted_position], p.size(), reach_), ghost_bytes);
-    const auto arrived = halo_->ghosts(p);
+    auto plan = domain.plan_halo(p[field::sorted_position], p.size(), reach_, complaint);
+    std::vector<Ghost> arrived;
+    halo_.emplace(comm, std::move(plan), ghost_bytes, p, arrived);
     const auto n = Index(arrived.size());
     Array<double> x(n), y(n), z(n);
     Array<std::int64_t> id(n);
@@ -83,7 +89,8 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
         x[k] = arrived[k].sorted_position.x, y[k] = arrived[k].sorted_position.y, z[k] = arrived[k].sorted_position.z,
         id[k] = arrived[k].id;
     ghost_sorted_ = sort_into_columns(columns_, x.data(), y.data(), z.data(), id.data(), n);
-    ghost_x_.resize(n), ghost_y_.resize(n), ghost_z_.resize(n), ghost_id_.resize(n), ghost_soil_.resize(n);
+    for (auto* a : {&ghost_x_, &ghost_y_, &ghost_z_}) resize_anew(*a, std::size_t(n));
+    resize_anew(ghost_id_, std::size_t(n)), resize_anew(ghost_soil_, std::size_t(n));
     std::vector<Index> slot(n);
     for (Index k = 0; k < n; ++k) {
         const Index from = ghost_sorted_.order[k];
@@ -92,6 +99,7 @@ void Layout::exchange_ghosts(const Comm& comm, const Domain& domain, const Parti
         slot[from] = k;
     }
     halo_->assign_slots(slot);
+    ghost_sorted_.order = {};
 }
 
 void Layout::renew_walls(const Particles& p, PairModel& model)
@@ -128,6 +136,7 @@ void Layout::renew_walls(const Particles& p, PairModel& model)
     for (auto& w : walls_) w.sort(columns_);
     ++wall_renewals_;
     model.set_walls(scene_, walls_);
+    for (auto& w : walls_) w.id = {};
 }
 
 void Layout::add_moved_points(int wall)
@@ -164,6 +173,7 @@ void Layout::prepare_lists(StepInput& in, double way, double speed)
     const double grain = 4e-6 * scene_.smoothing_length();
     in.prune = 2 * (pruned_way_ + way) + grain > pruned_margin_;
     if (in.prune) {
+        lists_.forget_pruned();
         // Instructions a cluster: 113 an entry of the pruned list, of which a margin of m supports adds 95 * 2.3 m; 25 for each of 117
         // entries of the whole list in one of m/u steps, u the way of two particles in a step. Least in sum at m = sqrt(0.12 u).
         constexpr double prune_cost = 25.0 * 117 / (113 * 95 * 2.3);
@@ -183,23 +193,14 @@ Vector Layout::sorted(const Particles& p, Index record) const
     return {ghost_x_[record - n], ghost_y_[record - n], ghost_z_[record - n]};
 }
 
-std::size_t Layout::bytes() const
+void Layout::add_bytes(MemoryUse& to) const
 {
-    std::size_t b = lists_.bytes() + std::size_t(ghosts()) * 32;
-    for (const auto& w : walls_) b += w.x.size() * (3 * sizeof(double) + sizeof(std::int64_t) + sizeof(Index));
-    return b;
-}
-
-void rethrow_on_all_ranks(const Comm& comm, const std::function<void()>& work)
-{
-    std::string complaint;
-    try {
-        work();
-    } catch (const NumbersFailed& e) {
-        complaint = e.what();
-    }
-    const int worst = int(comm.max(std::int64_t(complaint.empty() ? -1 : comm.rank())));
-    if (worst >= 0) throw NumbersFailed(comm.broadcast(complaint, worst));
+    to.lists += lists_.bytes() + sorted_.bytes() + ghost_sorted_.bytes();
+    to.pruned_lists += lists_.pruned_bytes();
+    to.ghosts += (ghost_x_.capacity() + ghost_y_.capacity() + ghost_z_.capacity()) * sizeof(double) +
+                 ghost_id_.capacity() * sizeof(std::int64_t) + ghost_soil_.capacity() * sizeof(std::int32_t);
+    if (halo_) to.ghosts += halo_->bytes();
+    for (const auto& w : walls_) to.walls += w.bytes();
 }
 
 } // namespace kuzure

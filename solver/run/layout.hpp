@@ -5,9 +5,9 @@
 #include "perf/phases.hpp"
 #include "solver/kernels/pair_model.hpp"
 #include "solver/run/cover.hpp"
+#include "solver/run/memory_use.hpp"
 #include "solver/scene/fill.hpp"
 #include "solver/scene/scene.hpp"
-#include <functional>
 
 namespace kuzure {
 
@@ -47,10 +47,10 @@ public:
     /// How far lists and ghosts reach, m.
     double reach() const { return reach_; }
     bool built() const { return built_; }
-    std::size_t bytes() const;
+    void add_bytes(MemoryUse&) const;
 
 private:
-    void exchange_ghosts(const Comm&, const Domain&, const Particles&, const PairModel&);
+    void exchange_ghosts(const Comm&, const Domain&, const Particles&, const PairModel&, const std::string& complaint);
     void renew_walls(const Particles&, PairModel&);
     /// Adds the points of a wall that moves as it stands now, those near the soil that are in no other wall.
     void add_moved_points(int wall);
@@ -74,8 +74,5 @@ private:
     double pruned_margin_ = 0, pruned_way_ = 0;
     bool built_ = false;
 };
-
-/// What fails on one rank fails on all, with the words of the highest such rank. Collective.
-void rethrow_on_all_ranks(const Comm&, const std::function<void()>& work);
 
 } // namespace kuzure

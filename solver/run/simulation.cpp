@@ -407,9 +407,14 @@ int Simulation::halo_messages() const
     return halo ? halo->messages_per_refresh() * int(model_->stages().size()) : 0;
 }
 
-std::size_t Simulation::memory_bytes() const
+MemoryUse Simulation::memory() const
 {
-    return particles_.bytes_per_particle() * particles_.size() + layout_.bytes() + model_->bytes();
+    MemoryUse m;
+    m.state = particles_.bytes(), m.sorting = particles_.spare_bytes();
+    m.records = model_->record_memory();
+    m.walls = model_->wall_memory() + wall_forces_.bytes();
+    layout_.add_bytes(m);
+    return m;
 }
 
 } // namespace kuzure

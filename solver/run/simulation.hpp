@@ -102,7 +102,7 @@ public:
     std::int64_t halo_bytes() const;
     int halo_messages() const;
     /// Bytes of this rank's large arrays.
-    std::size_t memory_bytes() const;
+    MemoryUse memory() const;
 
 private:
     Simulation(const Comm&, const Scene&, RunOptions, const Clock&);

@@ -53,7 +53,7 @@ void WallForces::see(Index wall, Index point, Vector x, const Stress& sigma, std
     const auto& own = since_[std::size_t(wall)];
     const Vector then{w.x[point], w.y[point], w.z[point]}, now = own ? scene::placed(*own, then) : then, r = x - now;
     const double t = 1 - length(r) / scene_.support();
-    const auto& faces = faces_[std::size_t(wall)][std::size_t(point)];
+    const auto faces = faces_[std::size_t(wall)][std::size_t(point)];
     if (!(t > 0) || faces.empty()) return;
     const auto of_now = [&](const Face& f) { return own || since_[std::size_t(f.wall)] ? face_of_now(f, then, now) : f; };
     const std::size_t mirrors = mirroring_face(faces, face_ramp * scene_.smoothing_length(), [&](const Face& f) {
@@ -100,17 +100,18 @@ template <class Visit> void WallForces::for_each_force(const Particles& p, Index
     const ClusterLists& lists = layout_.lists();
     const auto all = lists.walls(cluster);
     if (all.empty()) return;
-    const bool alone = std::size_t(all[1]) + 2 == all.size() && own_faces_[std::size_t(all[0])];
+    const bool alone = all.one_wall() && own_faces_[std::size_t(all.first_wall())];
     std::vector<Seen> seen;
     for (Index i = lists.first(cluster); i < lists.first(cluster) + lists.count(cluster); ++i) {
         const Vector a = p[field::wall_force][i];
         if (a == Vector{}) continue;
         const Vector x = p[field::position][i];
         seen.clear();
-        if (alone) seen.push_back({int(all[0])});
+        if (alone) seen.push_back({all.first_wall()});
         else
-            for (auto runs = all; !runs.empty(); runs = runs.subspan(2 + std::size_t(runs[1])))
-                for (const Index point : runs.subspan(2, std::size_t(runs[1]))) see(runs[0], point, x, p[field::stress][i], seen);
+            all.for_each([&](int wall, const PointSet& points) {
+                points.for_each([&](Index point) { see(wall, point, x, p[field::stress][i], seen); });
+            });
         share(seen, x, (-soils_[std::size_t(p[field::soil][i])].density * scene_.particle_volume()) * a, visit);
     }
 }
@@ -131,15 +132,14 @@ void WallForces::renew_faces()
     poses_.clear(), since_.assign(scene_.walls.size(), {});
     for (const auto& w : scene_.walls) poses_.push_back(w.pose);
     const WallSurface surface(scene_);
-    faces_.assign(layout_.walls().size(), {}), own_faces_.assign(faces_.size(), true);
-    for (std::size_t w = 0; w < faces_.size(); ++w) {
+    faces_.clear(), own_faces_.clear();
+    for (std::size_t w = 0; w < layout_.walls().size(); ++w) {
         const WallPoints& points = layout_.walls()[w];
-        const Index n = Index(points.x.size());
-        faces_[w].resize(std::size_t(n));
-#pragma omp parallel for schedule(dynamic, 256)
-        for (Index k = 0; k < n; ++k) surface.faces({points.x[k], points.y[k], points.z[k]}, scene_.support(), faces_[w][std::size_t(k)]);
-        own_faces_[w] = std::ranges::all_of(
-            faces_[w], [&](const auto& of) { return std::ranges::all_of(of, [&](const Face& f) { return f.wall == int(w); }); });
+        const auto& faces = faces_.emplace_back(surface, points.x, points.y, points.z, scene_.support());
+        bool own = true;
+        for (std::size_t k = 0; k < faces.size(); ++k)
+            own = own && std::ranges::all_of(faces[k], [&](const Face& f) { return f.wall == int(w); });
+        own_faces_.push_back(own);
     }
 }
 

@@ -30,6 +30,13 @@ public:
     /// Collective. `impulse` as in the clock of this rank.
     std::vector<WallLoad> loads(const Team&, const Particles&, const Clock&);
 
+    std::size_t bytes() const
+    {
+        std::size_t b = 0;
+        for (const auto& f : faces_) b += f.bytes();
+        return b;
+    }
+
 private:
     struct Seen;
     /// visit(number in walls_, position, force on the wall) for every particle of a cluster and every named wall in its reach.
@@ -48,13 +55,13 @@ private:
     const Scene& scene_;
     std::span<const Material> soils_;
     const Layout& layout_;
-    std::vector<int> walls_;                            // those with names
-    std::vector<int> number_of_;                        // of each wall in walls_, -1 for one without a name
-    std::vector<std::vector<std::vector<Face>>> faces_; // of each point of each wall
-    std::vector<scene::Pose> poses_;                    // of each wall, for which faces_ are
-    std::vector<std::optional<scene::Pose>> since_;     // of each wall that has moved since
-    std::vector<bool> own_faces_;                       // of each wall: none of its points stands behind a face of another
-    std::int64_t faces_of_ = -1;                        // Layout::wall_renewals() for which they are
+    std::vector<int> walls_;                        // those with names
+    std::vector<int> number_of_;                    // of each wall in walls_, -1 for one without a name
+    std::vector<PointFaces> faces_;                 // of each wall
+    std::vector<scene::Pose> poses_;                // of each wall, for which faces_ are
+    std::vector<std::optional<scene::Pose>> since_; // of each wall that has moved since
+    std::vector<bool> own_faces_;                   // of each wall: none of its points stands behind a face of another
+    std::int64_t faces_of_ = -1;                    // Layout::wall_renewals() for which they are
 };
 
 } // namespace kuzure

@@ -52,15 +52,16 @@ Neighbourhoods inspect_neighbours(const Team& team, const Scene& scene, std::int
             for (Index i = lists.first(c); i < lists.first(c) + lists.count(c); ++i) {
                 const Vector at{px[i], py[i], pz[i]};
                 int neighbours = 0, near = 0;
-                for (const Index j : lists.soil(c)) {
+                lists.soil(c).for_each([&](Index j) {
                     const Vector r = at - (j < n ? Vector{px[j], py[j], pz[j]} : layout.sorted(p, j));
                     const double r2 = dot(r, r);
                     neighbours += r2 < support2, near += r2 < near2;
-                }
+                });
                 my_clumped += near > 1; // every particle meets itself
                 my_crowded.meet((neighbours - 1) / lattice, id[i]);
-                for (auto walls = lists.walls(c); !walls.empty(); walls = walls.subspan(2 + walls[1]))
-                    my_sunk.meet(-scene::contact(scene.walls[walls[0]], at, scene.dimensions).distance / dx, id[i]);
+                lists.walls(c).for_each([&](int wall, const PointSet&) {
+                    my_sunk.meet(-scene::contact(scene.walls[std::size_t(wall)], at, scene.dimensions).distance / dx, id[i]);
+                });
             }
 #pragma omp critical
         {

@@ -14,31 +14,45 @@
 #include "solver/pairs/cluster.hpp"
 #include "solver/scene/parts.hpp"
 #include "solver/walls/surface.hpp"
+#include <array>
 
 namespace kuzure {
 
-/// One exposed face behind which a wall point lies, as lanes see it; lengths in the unit of the pair sums.
-template <class T> struct FaceRecord {
-    T nx, ny, nz, depth;
+/// What exposed faces are like, as lanes see them: of a plane wall all alike.
+template <class T> struct FaceKind {
+    T nx, ny, nz;
     T stick;   // 1: all of the motion is mirrored (rough), 0: its normal part
     T coulomb; // 1 where Coulomb's law holds
     T tangent; // tan(friction angle)
-    T last;    // 1 for the last face of its point
     T holds;   // 1 where sunk soil is held out: real ground
     T drag;    // traction over rho v^2
-    T tied;    // 1 where it is as near as the one before it
+};
+/// One of them behind which a wall point lies, by its depth in the unit of the pair sums.
+template <class T> struct FaceRecord {
+    T depth;
+    Index kind;              // in WallRecords::kinds
+    std::int16_t last, tied; // 1 for the last face of its point; where it is as near as the one before it
 };
 /// How the surface moves there, m/s: in this step, and in the step to come.
 template <class T> struct FaceMotion {
     T vx, vy, vz, next_x, next_y, next_z;
 };
 
-/// Points of one wall as the pair loop reads them, and the faces of each.
+/// Points of one wall as the pair loop reads them, and the faces of each, one at least.
 template <class T> struct WallRecords {
-    Array<Coordinate<T>> x, y, z;
+    const Coordinate<T>*x = nullptr, *y = nullptr, *z = nullptr; // the run's own points where those serve, else `made`
+    std::array<Array<Coordinate<T>>, 3> made;
     std::vector<Index> first; // of each point in `faces`
     std::vector<FaceRecord<T>> faces;
+    std::vector<FaceKind<T>> kinds;
     std::vector<FaceMotion<T>> motion; // of each face, where walls move; else empty
+    std::size_t bytes() const
+    {
+        std::size_t b = 0;
+        for (const auto& m : made) b += m.capacity() * sizeof(Coordinate<T>);
+        return b + first.capacity() * sizeof(Index) + faces.capacity() * sizeof(FaceRecord<T>) + kinds.capacity() * sizeof(FaceKind<T>) +
+               motion.capacity() * sizeof(FaceMotion<T>);
+    }
 };
 
 /// What the lanes of a cluster see of one wall point.
@@ -59,11 +73,13 @@ struct MirrorImage {
 
 /// How a point mirrors each lane (FacesInFront). `ramp`: face_ramp in the unit of the pair sums; `motion`: of the faces, where walls move.
 template <bool moving, class Law, class V, class T>
-KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, V ramp, const FaceMotion<T>* motion)
+KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* face, const FaceKind<T>* kinds, V ramp,
+                               const FaceMotion<T>* motion)
 {
-    const auto of = [&](const FaceRecord<T>& f) {
+    const auto of = [&](const FaceRecord<T>& one) {
+        const FaceKind<T>& f = kinds[one.kind];
         const Vec3<V> n{V(f.nx), V(f.ny), V(f.nz)};
-        const V along = dot(r, n), depth(f.depth);
+        const V along = dot(r, n), depth(one.depth);
         Mirror<V> m{n,
                     law.factor(along, depth),
                     V(f.stick),
@@ -80,20 +96,20 @@ KUZURE_INLINE Mirror<V> mirror(const Law& law, Vec3<V> r, const FaceRecord<T>* f
         return m;
     };
     Mirror<V> m = of(*face);
-    if (face->last != T(0)) return m;
+    if (face->last) return m;
     FacesInFront<V> faces(ramp);
     faces.add(m.normal, dot(r, m.normal) - V(face->depth), false);
     do {
         ++face;
         if constexpr (moving) ++motion;
         const Mirror<V> next = of(*face);
-        const auto use = faces.add(next.normal, dot(r, next.normal) - V(face->depth), face->tied != T(0));
+        const auto use = faces.add(next.normal, dot(r, next.normal) - V(face->depth), face->tied != 0);
         m.normal = faces.chosen(use, next.normal, m.normal);
         m.factor = select(use, next.factor, m.factor), m.stick = select(use, next.stick, m.stick);
         m.coulomb = select(use, next.coulomb, m.coulomb), m.tangent = select(use, next.tangent, m.tangent);
         m.sunk = select(use, next.sunk, m.sunk), m.drag = select(use, next.drag, m.drag);
         if constexpr (moving) m.v = faces.chosen(use, next.v, m.v), m.next = faces.chosen(use, next.next, m.next);
-    } while (face->last == T(0));
+    } while (!face->last);
     m.normal = faces.normal(m.normal);
     return m;
 }

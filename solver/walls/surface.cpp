@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <numbers>
+#include <omp.h>
 
 namespace kuzure {
 
@@ -266,6 +267,44 @@ double WallSurface::depth(Vector point, double reach) const
     std::vector<Face> found;
     faces(point, reach, found);
     return found.empty() ? reach : found.front().depth;
+}
+
+PointFaces::PointFaces(const WallSurface& surface, std::span<const double> x, std::span<const double> y, std::span<const double> z,
+                       double reach)
+    : n_(x.size())
+{
+    constexpr std::size_t enough = 256; // points for a thread
+    const std::size_t parts = std::clamp<std::size_t>(4 * std::size_t(omp_get_max_threads()), 1, 1 + n_ / enough);
+    share_ = std::max<std::size_t>(1, (n_ + parts - 1) / parts);
+    parts_.resize((n_ + share_ - 1) / share_);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+        auto& to = parts_[p];
+        to.first.reserve(std::min(share_, n_ - p * share_) + 1);
+        to.first.push_back(0);
+        std::vector<Face> found;
+        for (std::size_t k = p * share_; k < std::min(n_, (p + 1) * share_); ++k) {
+            found.clear();
+            surface.faces({x[k], y[k], z[k]}, reach, found);
+            to.faces.insert(to.faces.end(), found.begin(), found.end());
+            to.first.push_back(Index(to.faces.size()));
+        }
+        to.faces.shrink_to_fit();
+    }
+}
+
+std::size_t PointFaces::faces() const
+{
+    std::size_t n = 0;
+    for (const auto& p : parts_) n += p.faces.size();
+    return n;
+}
+
+std::size_t PointFaces::bytes() const
+{
+    std::size_t b = 0;
+    for (const auto& p : parts_) b += p.first.capacity() * sizeof(Index) + p.faces.capacity() * sizeof(Face);
+    return b;
 }
 
 } // namespace kuzure

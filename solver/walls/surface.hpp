@@ -133,4 +133,29 @@ private:
     std::vector<Part> parts_;
 };
 
+/// The exposed faces of many points, no further than `reach` from each.
+class PointFaces {
+public:
+    PointFaces() = default;
+    PointFaces(const WallSurface&, std::span<const double> x, std::span<const double> y, std::span<const double> z, double reach);
+    std::size_t size() const { return n_; }
+    std::span<const Face> operator[](std::size_t point) const
+    {
+        const Part& p = parts_[point / share_];
+        const std::size_t k = point % share_;
+        return {p.faces.data() + p.first[k], p.faces.data() + p.first[k + 1]};
+    }
+    /// Of all points.
+    std::size_t faces() const;
+    std::size_t bytes() const;
+
+private:
+    struct Part { // made by one thread
+        std::vector<Index> first;
+        std::vector<Face> faces;
+    };
+    std::size_t n_ = 0, share_ = 1; // points, in all and in a part
+    std::vector<Part> parts_;
+};
+
 } // namespace kuzure

@@ -251,6 +251,56 @@ TEST_P(Clouds, MigrateAndSeeEveryPair)
     expect_complete_halo(c, domain, p);
 }
 
+/// While soil creeps on, ranks ask those that may be near, and all others only when some soil has come far from where it was told to be.
+/// The plans are the same as where all tell all each time.
+TEST(Halo, AllTellAllSeldom)
+{
+    for (const Cloud& c : clouds) {
+        SCOPED_TRACE(c.name);
+        Particles p = scatter(c, 21);
+        Domain domain = domain_of(c);
+        domain.cut(blocks_of(domain, p));
+        domain.migrate(p);
+        constexpr int plans = 24;
+        const double each = 0.1 * c.reach; // half a skin
+        for (int k = 0; k < plans; ++k) {
+            Domain fresh = domain_of(c); // knows nothing: all tell all
+            const HaloPlan mine = domain.plan_halo(p, c.reach), other = fresh.plan_halo(p, c.reach);
+            ASSERT_EQ(fresh.tellings(), world().size() > 1 || c.periodic[0] || c.periodic[1] || c.periodic[2] ? 1 : 0);
+            ASSERT_EQ(mine.peers.size(), other.peers.size());
+            for (std::size_t q = 0; q < mine.peers.size(); ++q) {
+                ASSERT_EQ(mine.peers[q].rank, other.peers[q].rank);
+                ASSERT_EQ(mine.peers[q].sends.size(), other.peers[q].sends.size());
+                for (std::size_t i = 0; i < mine.peers[q].sends.size(); ++i) {
+                    ASSERT_EQ(mine.peers[q].sends[i].owned, other.peers[q].sends[i].owned);
+                    ASSERT_EQ(mine.peers[q].sends[i].shift, other.peers[q].sends[i].shift);
+                }
+            }
+            drift(c, p, each, unsigned(k));
+            if (k % 4 == 3) domain.migrate(p);
+        }
+        EXPECT_GE(domain.tellings(), world().size() > 1 ? 1 : 0);
+        EXPECT_LE(domain.tellings(), plans / 4);
+    }
+}
+
+/// One that flies far off in one go is found by whom it comes near: what was told holds no longer.
+TEST(Halo, ALeapIsToldToAll)
+{
+    const Cloud& c = clouds[0];
+    Particles p = scatter(c, 22);
+    Domain domain = domain_of(c);
+    domain.cut(blocks_of(domain, p));
+    domain.migrate(p);
+    static_cast<void>(domain.plan_halo(p, c.reach));
+    const auto before = domain.tellings();
+    const auto all = all_particles(p);
+    for (Index i = 0; i < p.size(); ++i) // the first lands on the last
+        if (p[field::id][i] == 0) p[field::position].set(i, all.back().x + Vector{0.1 * c.reach, 0, 0});
+    expect_complete_halo(c, domain, p);
+    EXPECT_LE(domain.tellings(), before + 1);
+}
+
 TEST(Halo, OneRankMayHaveEverything)
 {
     const Cloud& c = clouds[2];

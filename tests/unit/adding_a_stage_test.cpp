@@ -42,8 +42,8 @@ private:
             own[0][k] = r.vx, own[1][k] = r.vy, own[2][k] = r.vz;
         }
         const Vec3<V> v{load<V>(own[0]), load<V>(own[1]), load<V>(own[2])};
-        for (Index k = 0; k < near.n; ++k) {
-            const auto& j = kinematics_[std::size_t(near.entries[k])];
+        for (const Index k : near) {
+            const auto& j = kinematics_[std::size_t(k)];
             const Vec3<V> r = i.position.minus(j);
             const V w = V(j.volume) * model_.kernel.value(max(support - root<M::Kernel::divides>(max(dot(r, r), tiny)).root, zero));
             sums.difference = fma(w, Vec3<V>{j.vx - v.x, j.vy - v.y, j.vz - v.z}, sums.difference);

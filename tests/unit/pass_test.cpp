@@ -267,7 +267,8 @@ TEST(Lists, HoldEveryPairInReachInGlobalOrder)
                 const double reach = s.support() * (1 + skin);
                 const auto x = c.particles[field::position];
                 for (Index k = 0; k < c.lists.size(); ++k) {
-                    const auto list = c.lists.soil(k);
+                    std::vector<Index> list;
+                    c.lists.soil(k).for_each([&](Index j) { list.push_back(j); });
                     ASSERT_TRUE(std::is_sorted(list.begin(), list.end()));
                     for (int l = 0; l < c.lists.count(k); ++l)
                         for (Index j = 0; j < c.particles.size(); ++j)

@@ -87,9 +87,10 @@ void Ending::write_summary(Simulation& sim, const Outputs& outputs, const std::s
     s.message = message;
     s.host = host_name(), s.hosts = comm_.node_position().nodes, s.warnings = messages_.warnings();
     s.predicted_seconds = facts_.forecast.seconds, s.predicted_low = facts_.forecast.low, s.predicted_high = facts_.forecast.high;
-    const std::int64_t memory = comm_.max(std::int64_t(sim.memory_bytes()));
     auto j = io::to_json(s);
-    j["memory_bytes_per_rank"] = memory;
+    const MemoryUse memory = sim.memory();
+    j["memory_bytes_per_rank"] = comm_.max(std::int64_t(memory.all()));
+    memory.for_each([&](std::string_view kind, std::size_t bytes) { j["memory_bytes_by_kind"][kind] = comm_.max(std::int64_t(bytes)); });
     if (sim.filling().wall_count() > 0 && scene::walls_change(scene_)) j["walls_in"] = {"snapshots/state_*.hdf"};
     else if (sim.filling().wall_count() > 0) j["walls_in"] = {"snapshots/state_000000.hdf", "snapshots/walls.hdf"};
     j["rebuilds"] = sim.rebuilds();

@@ -17,6 +17,8 @@ io::WallPoints wall_share(const Comm& comm, const scene::Filling& f, const Mater
     io::WallPoints w;
     const std::int64_t n = f.shown_wall_count();
     const std::int64_t begin = n * comm.rank() / comm.size(), end = n * (comm.rank() + 1) / comm.size();
+    const auto mine = std::size_t(end - begin);
+    w.position.reserve(mine), w.id.reserve(mine), w.density.reserve(mine);
     f.for_each_shown_wall(begin, end, [&](std::int64_t id, Vector x) {
         w.position.push_back(x), w.id.push_back(id), w.density.push_back(first_soil.density);
     });

@@ -3,6 +3,7 @@
 #include "io/snapshot.hpp"
 #include "solver/run/blocks.hpp"
 #include "solver/scene/column_bytes.hpp"
+#include "solver/scene/ground.hpp"
 #include "solver/scene/material.hpp"
 #include "solver/scene/motion.hpp"
 #include "solver/scene/nearby.hpp"
@@ -51,6 +52,53 @@ double neighbours_at_start(const Scene& s, const scene::Filling& f)
     return samples > 0 ? double(pairs) / double(samples) : 0;
 }
 
+namespace {
+
+/// Bytes of a soil particle in what the run makes of soil at spacings as they begin; lengths in spacings.
+struct ListBytes {
+    double whole, pruned;
+};
+ListBytes list_bytes(const Scene& s, int width)
+{
+    const double support = 2 * s.space.h, reach = support * (1 + s.accuracy.skin), pi = std::numbers::pi, W = width;
+    const bool flat = s.dimensions == 2;
+    // Columns are two spacings wide; a cluster fills most of its own. Of each column around it has the heights in reach, in words of 32
+    // points.
+    const double layer = flat ? 2 : 4, edge = 1.4, tall = std::max(0.0, W / layer - 1);
+    const int n = int(std::ceil(reach / 2));
+    double words = 0;
+    for (int a = -n; a <= n; ++a)
+        for (int b = flat ? 0 : -n; b <= (flat ? 0 : n); ++b) {
+            const auto gap = [&](int k) { return k == 0 ? 0 : 2 * std::abs(k) - 0.5 * (2 + edge); };
+            const double left = reach * reach - gap(a) * gap(a) - gap(b) * gap(b);
+            if (left > 0) words += std::ceil(layer * (2 * std::sqrt(left) + tall) / 32);
+        }
+    // What is nearer than the support, and half of the way to the next pruning, to any of its particles: nearly a box with rounded edges.
+    const double r = support * (1 + 0.03), side = flat ? 0 : edge;
+    const double near = flat ? edge * tall + 2 * r * (edge + tall) + pi * r * r
+                             : edge * side * tall + 2 * r * (edge * side + (edge + side) * tall) + pi * r * r * (edge + side + tall) +
+                                   4 * pi / 3 * r * r * r;
+    constexpr double of_cluster = 37; // first, counts, pointers, interior or rim
+    return {(8 * words + of_cluster) / W, 4 * near / W};
+}
+
+/// Wall points that a run holds, and their bytes: those that soil may come near, of which lists need what lies no deeper than the support.
+double wall_bytes(const Scene& s, const scene::Filling& f, bool mixed)
+{
+    if (f.wall_count() == 0) return 0;
+    // Soil that falls comes about as far beyond its sides as it is high.
+    const double far = 4 * list_reach(s) + f.soil_height(), below = 4 * list_reach(s) + s.support();
+    scene::Box near = f.soil_bounds();
+    near.low = near.low - Vector{far, far, below}, near.high = near.high + Vector{far, far, below};
+    const double points = double(f.wall_count_in(near));
+    const bool one_pass = s.accuracy.scheme == scene::Scheme::LeapFrog;
+    // Position, in the records' form too where that is another; faces, and what they are like where that is no plane.
+    const double kept = 24 + (one_pass || mixed ? (mixed ? 12 : 24) : 0) + (one_pass ? 0 : 20) + (scene::ground_of(s) ? 64 : 0);
+    return points * kept;
+}
+
+} // namespace
+
 Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& model)
 {
     Estimate e{};
@@ -65,21 +113,21 @@ Estimate estimate(const Scene& s, const scene::Filling& f, const PairModel& mode
     e.steps = std::int64_t(std::llround(s.time.end / e.dt));
 
     const double k = 2 * s.space.h;
-    const double neighbours = s.dimensions == 3 ? 4 * std::numbers::pi / 3 * k * k * k : std::numbers::pi * k * k;
     const bool mixed = model.precision() == scene::Precision::Mixed;
     e.mixed = mixed;
     e.support = k;
     e.record = double(ghost_bytes(model));
     const double records = double(model.record_bytes());
-    const double skin = std::pow(1 + s.accuracy.skin, 3);
-    const double list = 4.0 * neighbours * skin * 2.1 / model.cluster_width();
+    const ListBytes lists = list_bytes(s, model.cluster_width());
     const double columns = scene::column_bytes(s, f);
     const auto& box = f.soil_bounds();
     const auto across = [&](double low, double high) { return std::floor((high - low) / (2 * s.space.spacing)) + 1; };
     e.columns = across(box.low.x, box.high.x) * (s.dimensions == 3 ? across(box.low.y, box.high.y) : 1);
     e.longest =
         std::max({box.high.x - box.low.x, s.dimensions == 3 ? box.high.y - box.low.y : 0.0, box.high.z - box.low.z}) / s.space.spacing;
-    e.memory = 12 * e.columns + columns + double(e.soil) * (records + list + 24) + 60.0 * double(e.shown);
+    constexpr double sorting = 8 + 36; // a column beside the others; heights and numbers while they are sorted
+    e.memory = 12 * e.columns + columns + double(e.soil) * (records + lists.whole + lists.pruned + sorting) + wall_bytes(s, f, mixed) +
+               40.0 * double(e.shown) + 48.0 * double(e.soil + e.shown); // walls as shown, and one table of a snapshot
     // Outputs come at steps: never more of them than steps.
     const auto times = [&](double every) { return std::min(std::floor(s.time.end / every), double(e.steps)); };
     e.snapshots = s.output.every ? times(*s.output.every) + 2 : 2;

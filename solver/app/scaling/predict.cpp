@@ -19,18 +19,22 @@ io::MachineProfile machine_named(const std::string& name_or_path)
 namespace {
 
 // What the model assumes beside a machine's constants; each is explained in docs/performance.md.
-constexpr double rim_per_seen = 1.5;    // a cluster waits as a whole when one of its particles does
-constexpr double rebuild_exchanges = 4; // migration, boxes, counts, sorted positions of ghosts
-constexpr double sorted_bytes = 40;     // of a ghost's sorted position, id and soil, at a rebuild
-constexpr double box_bytes = 48;        // of a rank's box, which every rank gets
+constexpr double rim_per_seen = 1.5;       // a cluster waits as a whole when one of its particles does
+constexpr double rebuild_exchanges = 2.25; // boxes, sorted positions of ghosts; one rebuild in four migration
+constexpr double rebuild_sums = 1.75; // numbers that all ranks agree on: the halo's; one rebuild in four imbalance (two) and migration's
+constexpr double sorted_bytes = 32;   // of a ghost's sorted position, id and soil, at a rebuild
+constexpr double box_bytes = 48;      // of a rank's box, which every rank gets
+constexpr double rebuilds_a_telling = 12; // as often: soil at its fastest has left the boxes after 21, a cut comes in between
 // Of a cut between neighbours: from `perf/scaling.py drift`, 64 ranks (docs/performance.md).
-constexpr double even_seconds = 4.7e-5; // processor time here per block of the mean rank, of the longest rank
-constexpr double even_iterations = 55;  // numbers told to all peers, each with a sum over all ranks
-constexpr double even_rounds = 11;      // of offers: offers, answers and updates, and a sum and a maximum over all ranks
-constexpr double even_moves = 0.105;    // particles that migrate, of a rank's
-constexpr double box_of_blocks = 24;    // bytes of a rank's bounding box, which every rank gets
-constexpr double state_bytes = 252;     // of a particle that migrates
-constexpr double scalar_ns_here = 59;   // particle_ns of the machine where even_seconds was measured
+constexpr double even_seconds =
+    3.2e-5; // processor time here per block of the mean rank, of the longest rank: 4.7e-5, of which 0.68 of the instructions are left
+constexpr double even_iterations = 55; // numbers told to all peers, each with a sum over all ranks
+constexpr double even_rounds = 11;     // of offers: offers, answers and updates, and a sum and a maximum over all ranks
+constexpr double even_moves = 0.105;   // particles that migrate, of a rank's
+constexpr double box_of_blocks = 24;   // bytes of a rank's bounding box, which every rank gets
+constexpr double state_bytes = 252;    // of a particle that migrates
+constexpr double scalar_ns_here = 59;  // particle_ns of the machine where even_seconds was measured
+constexpr double weighed = 0.1; // of a rebuild's work on particles: pairs of one cluster in sixteen are counted, particles put to blocks
 
 /// What a scheme's step is made of: a machine's costs of pairs and particles are those of one pass (Bui's leap-frog) at the paper's step.
 /// hirata_52 on the machines of docs/performance.md: 579 rebuilds in 10,000 steps of 1e-4 s, 250 in 790 of the default; a
@@ -90,20 +94,20 @@ StepSeconds predict_step(std::span<const RankLoad> ranks, const Deployment& at)
     if (at.ranks < 2) return s;
     const double levels = std::ceil(std::log2(double(at.ranks)));
     s.reduction = 2 * levels * latency;
-    s.rebuild = (rebuild_exchanges * (2 * messages + 2 * levels) * latency + (node_ghosts * sorted_bytes) / bandwidth +
-                 double(at.ranks_per_node) * at.ranks * box_bytes / bandwidth) /
-                scheme.steps_per_rebuild;
+    const double collective = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
+    s.rebuild =
+        (rebuild_exchanges * (2 * messages * latency + collective) + rebuild_sums * collective + (node_ghosts * sorted_bytes) / bandwidth +
+         (double(at.ranks_per_node) * at.ranks * box_bytes / bandwidth + collective) / rebuilds_a_telling) /
+        scheme.steps_per_rebuild;
     // Cut when idle time has added up to a cut's cost C: with max/mean growing by d a step, each of t seconds, after
     // sqrt(2 C/(d t)) steps, and cut and idle time together cost 2 C of them.
-    // The pairs of each block are counted from the lists first: no more work than making the lists.
     double far = 0, most_particles = 0, soil = 0;
     for (const RankLoad& r : ranks) soil += r.particles;
     for (const RankLoad& r : ranks)
         far = std::max(far, r.far_messages + 0.2 * (r.messages - r.far_messages)), most_particles = std::max(most_particles, r.particles);
-    const double collective = 2 * levels * latency; // a sum, a maximum, or the barrier that ends an exchange
     const double cut = at.blocks == 0 ? 0
                                       : at.blocks / at.ranks * even_seconds * c.particle_ns / scalar_ns_here +
-                                            most_particles * particle * scheme.steps_per_rebuild +
+                                            weighed * most_particles * particle * scheme.steps_per_rebuild +
                                             even_iterations * (far * latency + latency + collective) +
                                             even_rounds * (3 * (messages * latency + collective) + 2 * collective) +
                                             double(at.ranks_per_node) * at.ranks * box_of_blocks / bandwidth + collective +
