@@ -413,8 +413,8 @@ private:
         const Sym3<U> sigma_h = p[field::half_stress].template load<U>(lanes.at);
         const U opened = in.remembering ? p[field::opened_volume].template load<U>(lanes.at) : U(0.0);
         a.h = return_to_cone(rotate(spin_increment(r.L, kick), sigma_h + loading) + loading, soil, opened);
-        a.rho_h = fma(kick, r.rho_rate, p[field::half_density].template load<U>(lanes.at));
-        a.rho_h = fma(a.h.opened - opened, a.rho_h, a.rho_h); // the soil between the gaps keeps its density
+        const U rho = p[field::density].template load<U>(lanes.at); // the soil between the gaps keeps its density
+        a.rho_h = fma(rho, a.h.opened - opened, fma(kick, r.rho_rate, p[field::half_density].template load<U>(lanes.at)));
         return a;
     }
     /// Values at the end of the step: half a step on from there.
@@ -427,8 +427,8 @@ private:
             return_to_cone(a.h.sigma + spin(spin_increment(r.L, half_dt), a.h.sigma) + hooke(half_dt * r.D, soil) + half_dt * r.diffusion,
                            soil, a.h.opened);
         a.sigma = predicted.sigma;
-        a.rho = fma(half_dt, r.rho_rate, a.rho_h);
-        a.rho = fma(predicted.opened - a.h.opened, a.rho, a.rho);
+        const U rho = std::as_const(*in.particles)[field::density].template load<U>(lanes.at);
+        a.rho = fma(rho, predicted.opened - a.h.opened, fma(half_dt, r.rho_rate, a.rho_h));
     }
     template <class Mine>
     KUZURE_INLINE void keep_sleepers(const StepInput& in, const Lanes& lanes, Mine mine, const Before& now, After& a) const
