@@ -1,5 +1,6 @@
 #include "io/snapshot.hpp"
 #include "io/hdf5.hpp"
+#include "solver/core/bulk_density.hpp"
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -175,7 +176,7 @@ private:
                 6, [s = p_[field::stress]](Index i) { return s[i]; }, [](std::size_t) { return Stress{}; });
         if (name == "density")
             return rows_.of(
-                1, [r = p_[field::density]](Index i) { return r[i]; }, [&](std::size_t i) { return walls_.density[i]; });
+                1, [this](Index i) { return bulk_density(p_, i); }, [&](std::size_t i) { return walls_.density[i]; });
         if (name == "plastic_strain") {
             if (!p_.has(field::plastic_strain))
                 return rows_.of(

@@ -1,6 +1,7 @@
 #include "solver/api/simulation.hpp"
 #include "io/hdf5.hpp"
 #include "io/scene_file.hpp"
+#include "solver/core/bulk_density.hpp"
 #include "solver/run/simulation.hpp"
 #include <fmt/format.h>
 
@@ -126,7 +127,7 @@ std::vector<Particle> Simulation::particles() const
     const auto id = p[field::id];
     const auto soil = p[field::soil];
     const auto position = p[field::position], origin = p[field::origin], velocity = p[field::velocity];
-    const auto density = p[field::density], plastic_strain = p[field::plastic_strain];
+    const auto plastic_strain = p[field::plastic_strain];
     const auto stress = p[field::stress];
     std::vector<Particle> all(std::size_t(p.size()));
     for (Index i = 0; i < p.size(); ++i) {
@@ -136,7 +137,7 @@ std::vector<Particle> Simulation::particles() const
                                vector(position[i]),
                                vector(position[i] - origin[i]),
                                vector(velocity[i]),
-                               density[i],
+                               bulk_density(p, i),
                                {s.xx, s.yy, s.zz, s.xy, s.yz, s.xz},
                                plastic_strain[i]};
     }

@@ -90,7 +90,7 @@ struct Particle {
     Vector position;           ///< m
     Vector displacement;       ///< m, since t = 0
     Vector velocity;           ///< m/s
-    double density = 0;        ///< kg/m^3
+    double density = 0;        ///< kg/m^3, with what has opened
     Stress stress;             ///< Pa
     double plastic_strain = 0; ///< accumulated plastic shear strain, 1
 };

@@ -23,7 +23,7 @@ template <Text Name, Text Unit, Shape S, class T = double> struct Field {
 };
 
 namespace field {
-// State at the step's time t: what snapshots show.
+// State at the step's time t: what snapshots show. Density is that of the soil between what has opened (core/bulk_density.hpp: with it).
 inline constexpr struct Position : Field<"position", "m", Shape::Vector> {
 } position;
 inline constexpr struct Velocity : Field<"velocity", "m/s", Shape::Vector> {

@@ -404,12 +404,13 @@ private:
         const U kick(in.kick), half(0.5);
         After a;
         a.v_h = fma(kick, r.a, p[field::half_velocity].template load<U>(lanes.at));
-        a.rho_h = fma(kick, r.rho_rate, p[field::half_density].template load<U>(lanes.at));
         // half before the turn and half after: second order in time
         const Sym3<U> loading = half * (hooke(kick * r.D, soil) + kick * r.diffusion);
         const Sym3<U> sigma_h = p[field::half_stress].template load<U>(lanes.at);
         const U opened = in.remembering ? p[field::opened_volume].template load<U>(lanes.at) : U(0.0);
         a.h = return_to_cone(rotate(spin_increment(r.L, kick), sigma_h + loading) + loading, soil, opened);
+        const U rho = p[field::density].template load<U>(lanes.at); // the soil between the gaps keeps its density
+        a.rho_h = fma(rho, a.h.opened - opened, fma(kick, r.rho_rate, p[field::half_density].template load<U>(lanes.at)));
         return a;
     }
     /// Values at the end of the step: half a step on from there.
@@ -418,11 +419,12 @@ private:
         const U dt(in.dt), half_dt = U(0.5) * dt;
         a.x = fma(dt, a.v_h, std::as_const(*in.particles)[field::position].template load<U>(lanes.at));
         a.v = fma(half_dt, r.a, a.v_h);
-        a.rho = fma(half_dt, r.rho_rate, a.rho_h);
-        a.sigma =
+        const auto predicted =
             return_to_cone(a.h.sigma + spin(spin_increment(r.L, half_dt), a.h.sigma) + hooke(half_dt * r.D, soil) + half_dt * r.diffusion,
-                           soil, a.h.opened)
-                .sigma;
+                           soil, a.h.opened);
+        a.sigma = predicted.sigma;
+        const U rho = std::as_const(*in.particles)[field::density].template load<U>(lanes.at);
+        a.rho = fma(rho, predicted.opened - a.h.opened, fma(half_dt, r.rho_rate, a.rho_h));
     }
     template <class Mine>
     KUZURE_INLINE void keep_sleepers(const StepInput& in, const Lanes& lanes, Mine mine, const Before& now, After& a) const

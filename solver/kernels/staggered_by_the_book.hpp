@@ -410,8 +410,8 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     // A Coulomb face counts where it pressed on the particle at the step's start, or where it is approached.
     if (kept[k].pressed > 0 || trace(sliding) < 0) of_i.L_walls = of_i.L_walls + sliding;
     correct(of_i, M, s);
-    // Wall points have the volume of mid-step, V (1 + dt/2 tr L).
-    of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
+    // Wall points have the volume of mid-step, V (1 + dt/2 tr L); that of soil which has opened stays V.
+    if (!(kept[k].opened > 0)) of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;
     of_i.viscous = (-1 / i.density) * pressure;
     return of_i;
@@ -437,8 +437,8 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
     const Stress loading = (dt / 2) * (hooke(D, law) + kept.stress_rate);
     const auto mapped = return_to_cone(rotate(spin_increment(strain.L, dt), i.stress + loading) + loading, law, kept.opened);
     const bool holds = mapped.d_lambda <= 0 && mapped.opened <= 0;
-    // d rho/dt = -rho tr L: (rho' - rho)/dt = -tr L (rho' + rho)/2
-    const double change = dt / 2 * trace(strain.L);
+    // d rho/dt = -rho (tr L - d opened/dt): (rho' - rho)/dt = -(tr L - d opened/dt) (rho' + rho)/2
+    const double change = dt / 2 * trace(strain.L) - (mapped.opened - kept.opened) / 2;
     Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.d_lambda, mapped.opened, 0, 0, 0};
     // The mean stress works on the strain and on the diffusion's elastic strain; what is not stored is plastic.
     const double mass = i.density * i.volume, volume = (mass / i.density + mass / next.density) / 2;

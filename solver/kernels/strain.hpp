@@ -274,10 +274,11 @@ private:
                 if (model_.adjoint) keep_correction(in, lanes, correction);
             }
         }
+        const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
         if (walled) {
             // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy
-            // in first order of dt
-            const U grown = fma(half_dt, trace(L) + trace(at_walls), one);
+            // in first order of dt. That of soil which has opened stays what it is
+            const U grown = select(less(zero, opened), one, fma(half_dt, trace(L) + trace(at_walls), one));
             at_walls = {grown * at_walls.x, grown * at_walls.y, grown * at_walls.z};
         }
         L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
@@ -290,10 +291,9 @@ private:
         // half before the turn and half after: second order in time, and exact in energy
         const Sym3<U> strain = dt * D;
         const Sym3<U> loading = half * (hooke(strain, soil.law) + dt * diffusion);
-        const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
         const auto mapped = return_to_cone(rotate(spin_increment(L, dt), sigma + loading) + loading, soil.law, opened);
-        // drho/dt = -rho tr L, by the midpoint rule
-        const U change = half_dt * trace(L);
+        // drho/dt = -rho tr L, by the midpoint rule, but for what opens and closes: the soil between the gaps keeps its density
+        const U change = half_dt * trace(L) - half * (mapped.opened - opened);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
         if (Below::controls()) {
             const U yields = mapped.d_lambda + mapped.opened, holds = select(less(zero, yields), zero, one);

@@ -1,4 +1,5 @@
 #include "solver/run/map_record.hpp"
+#include "solver/core/bulk_density.hpp"
 #include "solver/scene/numbers.hpp"
 #include <algorithm>
 #include <cmath>
@@ -82,7 +83,6 @@ void merge(std::vector<CellSums>& all)
 std::vector<CellSums> sum_over_cells(const Particles& p, const scene::MapGrid& grid, const MapUnits& u)
 {
     const auto x = p[field::position], v = p[field::velocity];
-    const auto rho = p[field::density];
     const auto soil = p[field::soil];
     const Index n = p.size();
     const double per_volume = 1 / u.volume, per_mass = 1 / u.mass, per_momentum = 1 / u.momentum; // exact
@@ -100,9 +100,10 @@ std::vector<CellSums> sum_over_cells(const Particles& p, const scene::MapGrid& g
             const Vector a = x[i], w = v[i];
             const double m = u.particle_mass[std::size_t(soil[i])];
             // Of numbers that have failed no map is made.
-            if (!finite(a) || !finite(w) || !std::isfinite(rho[i])) continue;
-            if (rho[i] * u.most_volume <= m || std::max({std::abs(w.x), std::abs(w.y), std::abs(w.z)}) >= u.most_speed) continue;
-            const double volume = m / rho[i];
+            const double rho = bulk_density(p, i);
+            if (!finite(a) || !finite(w) || !std::isfinite(rho)) continue;
+            if (rho * u.most_volume <= m || std::max({std::abs(w.x), std::abs(w.y), std::abs(w.z)}) >= u.most_speed) continue;
+            const double volume = m / rho;
             const std::int64_t at = grid.at(wrapped(a.x, 0), wrapped(a.y, 1));
             CellSums& s = mine.at(at < 0 ? grid.count() : at, a.z);
             s.volume += std::lrint(volume * per_volume), s.mass += std::lrint(m * per_mass);

@@ -1,4 +1,5 @@
 #include "solver/run/probes.hpp"
+#include "solver/core/bulk_density.hpp"
 #include "solver/run/exact_sums.hpp"
 #include <limits>
 
@@ -37,7 +38,7 @@ std::vector<Reading> read_probes(const Team& team, const Scene& scene, const sce
             const auto take = [&](Index i, double weight) {
                 const Vector at = x[i], moves = v[i];
                 const Stress s = stress[i];
-                const double all[numbers - 2] = {at.x, at.y, at.z, moves.x, moves.y, moves.z, rho[i],
+                const double all[numbers - 2] = {at.x, at.y, at.z, moves.x, moves.y, moves.z, bulk_density(p, i),
                                                  s.xx, s.yy, s.zz, s.xy,    s.yz,    s.xz,    plastic[i]};
                 add(numbers * k, 1), add(numbers * k + 1, weight);
                 for (std::size_t n = 2; n < numbers; ++n) add(numbers * k + n, weight * all[n - 2]);

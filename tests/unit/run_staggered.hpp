@@ -73,13 +73,14 @@ public:
     std::span<const Material> soils() const { return cloud_.soils; }
 
     void reset() { cloud_.particles = start_; }
-    /// This stress and nothing else that changes it but strain.
+    /// This stress and nothing else that changes it but strain; soil that has opened has opened by next to nothing.
     void set_stress(const Stress& s)
     {
         for (Index i = 0; i < start_.size(); ++i) {
             cloud_.particles[field::stress].set(i, s);
             if (start_.has(field::stress_rate)) cloud_.particles[field::stress_rate].set(i, Stress{});
-            if (start_.has(field::opened_volume)) cloud_.particles[field::opened_volume].set(i, 0.0);
+            if (start_.has(field::opened_volume))
+                cloud_.particles[field::opened_volume].set(i, std::as_const(start_)[field::opened_volume][i] > 0 ? 1e-300 : 0.0);
         }
         model_->make_records(cloud_.particles, cloud_.soils, {}); // who is in tension
     }

@@ -89,6 +89,16 @@ TEST_F(SnapshotTest, HoldsThePromisedTables)
     EXPECT_LE(std::filesystem::file_size(dir / "s.hdf"), io::snapshot_bytes(3, {}));
 }
 
+// Gaps count in the density that users see; the soil's own is what the sums take.
+TEST_F(SnapshotTest, DensityIsWithTheOpenedVolume)
+{
+    p.require(field::opened_volume);
+    p[field::opened_volume].set(1, 0.5);
+    io::write_snapshot(alone, dir / "s.hdf", p, walls, {0, 0, 3, "", {"density"}});
+    const io::H5Reader in(dir / "s.hdf");
+    EXPECT_THAT(read<double>(in, "PointData/density", 1), ElementsAre(1800, 1801 * std::exp(-0.5), 2000));
+}
+
 TEST_F(SnapshotTest, WritesOnlyTheFieldsAskedFor)
 {
     io::write_snapshot(alone, dir / "s.hdf", p, walls, {0, 0, 3, "", {"velocity"}});

@@ -1,4 +1,5 @@
 #include "solver/app/run/fronts.hpp"
+#include "solver/core/bulk_density.hpp"
 #include "solver/scene/events.hpp"
 #include "solver/scene/numbers.hpp"
 #include <algorithm>
@@ -108,7 +109,7 @@ double resting_volume_ratio(const Comm& comm, const Particles& p, const Scene& s
     for (Index i = 0; i < p.size(); ++i) {
         if (length(p[field::velocity][i]) > slow) continue;
         const auto& body = scene.bodies[std::size_t(filling.body_of(p[field::id][i]))];
-        ++count, sum += std::llround(scene.soils[std::size_t(body.soil)].density / p[field::density][i] * 0x1p32);
+        ++count, sum += std::llround(scene.soils[std::size_t(body.soil)].density / bulk_density(p, i) * 0x1p32);
     }
     count = comm.sum(count);
     const double total = double(comm.sum(sum)) * 0x1p-32;
