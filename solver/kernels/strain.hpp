@@ -295,13 +295,13 @@ private:
         // drho/dt = -rho tr L, by the midpoint rule, but for what opens and closes: the soil between the gaps keeps its density
         const U change = half_dt * trace(L) - half * (mapped.opened - opened);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
+        if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
+
+        keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         if (Below::controls()) {
             const U yields = mapped.d_lambda + mapped.opened, holds = select(less(zero, yields), zero, one);
             Below::write_affine(in, lanes, L, holds * sees_all * next.rho * soil.c);
         }
-        if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
-
-        keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
