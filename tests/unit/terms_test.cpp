@@ -22,7 +22,7 @@ TEST(Tension, ActsAgainstTensilePrincipalStressAlongItsAxis)
     EXPECT_EQ(tension({-900, -400, -200, 0, 0, 0}, 0.5), Stress{});
 }
 
-TEST(Tension, ThePartAlongTensileAxesIsCutOut)
+TEST(Tension, ThePartAlongTensileAxesIsTakenOut)
 {
     for (const double angle : {0.0, 0.3, 0.785, 1.2, 2.9}) {
         const double c = std::cos(angle), s = std::sin(angle);

@@ -64,13 +64,13 @@ TEST(WallSurface, AFaceThatTouchesTheSurfaceInALineIsNone)
 {
     for (const int dimensions : {2, 3})
         for (const double z : {0.5, 0.3})
-            for (const double cut : {0.0, 1.0, -3.0}) {
-                const double top = z + cut / 4;
+            for (const double seam : {0.0, 1.0, -3.0}) {
+                const double top = z + seam / 4;
                 for (const double beside : {0.5, 1.5, 2.5}) {
-                    const Vector at{cut + beside, 0, top}; // the top of the cut is as high
+                    const Vector at{seam + beside, 0, top}; // the top of the seam is as high
                     const Vector normal = (1 / std::hypot(0.25, 1)) * Vector{-0.25, 0, 1};
-                    for (const auto& cuts : {std::vector<double>{}, {cut}, {cut - 2, cut}, {cut, cut + 2}})
-                        expect_one(ground_of(dimensions, bank(z, cuts)), at, normal.z * beside / 4, normal);
+                    for (const auto& seams : {std::vector<double>{}, {seam}, {seam - 2, seam}, {seam, seam + 2}})
+                        expect_one(ground_of(dimensions, bank(z, seams)), at, normal.z * beside / 4, normal);
                 }
             }
 }
