@@ -110,8 +110,8 @@ TEST(WallSurface, AFaceThatBeginsAsHighAsThePointCounts)
 {
     for (const double digit : {0.0, 1e-16, -1e-16}) {
         const Scene joined = ground_of(2, {ground(Box{{0, 0, -8}, {8, 0, 8}}), ground(Box{{-8, 0, -8}, {0, 0, 0.5 + digit}})});
-        const Scene cut = ground_of(2, {ground(Box{{0, 0, 0.5 + digit}, {8, 0, 8}}), ground(Box{{-8, 0, -8}, {8, 0, 0.5 + digit}})});
-        for (const Scene* s : {&joined, &cut}) expect_one(*s, {1.5, 0, 0.5}, 1.5, {-1, 0, 0});
+        const Scene split = ground_of(2, {ground(Box{{0, 0, 0.5 + digit}, {8, 0, 8}}), ground(Box{{-8, 0, -8}, {8, 0, 0.5 + digit}})});
+        for (const Scene* s : {&joined, &split}) expect_one(*s, {1.5, 0, 0.5}, 1.5, {-1, 0, 0});
     }
 }
 
