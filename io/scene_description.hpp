@@ -306,6 +306,10 @@ template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
               {"wendland c2", scene::Kernel::WendlandC2},
               {"wendland c4", scene::Kernel::WendlandC4}},
              {.example = "\"wendland c2\"", .doc = "smoothing kernel"});
+    a.choice("accuracy.kernel_norm", accuracy.kernel_norm,
+             {{"lattice", scene::KernelNorm::Lattice}, {"continuum", scene::KernelNorm::Continuum}},
+             {.example = "\"lattice\"",
+              .doc = "gradients of linear fields are exact for particles on their lattice, or for infinitely many, as published"});
     a.number("accuracy.cfl", accuracy.cfl,
              {.unit = "1", .range = above(0), .example = "1.0", .doc = "Courant number dt c_p/h of the step where time.step is absent"});
     a.choice("accuracy.scheme", accuracy.scheme, {{"staggered", scene::Scheme::Staggered}, {"leap-frog", scene::Scheme::LeapFrog}},
@@ -324,6 +328,13 @@ template <class A> void describe_accuracy(A& a, scene::Accuracy& accuracy)
               .fallback = "0.0",
               .example = "1.0",
               .doc = "particles that shear plastically are shifted towards even spacing, by this constant (docs/theory.md); 0: not"});
+    a.number("accuracy.hourglass", accuracy.hourglass,
+             {.unit = "1",
+              .range = between(0, 0.5),
+              .fallback = "0.0",
+              .example = "0.1",
+              .doc = "motion of neighbours that no velocity gradient tells of is damped in soil that does not yield, by this strength "
+                     "(docs/theory.md); 0: not"});
     a.number("accuracy.skin", accuracy.skin,
              {.unit = "supports",
               .range = between(0.01, 0.5),

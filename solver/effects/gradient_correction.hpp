@@ -12,8 +12,12 @@ namespace kuzure {
 struct GradientCorrection {
     static constexpr double least_isotropy = 0.5; // det M over (tr M/dimensions)^dimensions
     static constexpr double least_trace = 0.4;    // tr M/dimensions
+    template <class V> struct Inverse {
+        Sym3<V> K;
+        V trusted; // 1 or 0
+    };
     /// M^-1 of a symmetric M (3-D, or 2-D in x-z), or 1 where M is not to be trusted or allowed (1 or 0) is 0.
-    template <class V> static KUZURE_INLINE Sym3<V> inverse(Sym3<V> m, int dimensions, V allowed)
+    template <class V> static KUZURE_INLINE Inverse<V> inverse(Sym3<V> m, int dimensions, V allowed)
     {
         using T = number<V>;
         const V one(1), zero(0), half(T(0.5));
@@ -27,7 +31,8 @@ struct GradientCorrection {
         };
         const V use = good(allowed), keep = one - use;
         const V per_det = use / fma(det, use, keep);
-        return {fma(cxx, per_det, keep), fma(cyy, per_det, keep), fma(czz, per_det, keep), cxy * per_det, cyz * per_det, cxz * per_det};
+        return {{fma(cxx, per_det, keep), fma(cyy, per_det, keep), fma(czz, per_det, keep), cxy * per_det, cyz * per_det, cxz * per_det},
+                use};
     }
 
     template <class V> struct Sums {

@@ -36,7 +36,8 @@ inline double contract(const Stress& s, const Matrix& L) { return kuzure::contra
 struct Kernel {
     scene::Kernel kind;
     int dimensions;
-    double h; // m
+    double h;        // m
+    double norm = 1; // of gradients
 
     /// W in 1/m^3 (1/m^2 in 2-D).
     double value(double r) const
@@ -72,7 +73,7 @@ struct Kernel {
     Vector gradient(Vector x_ij) const
     {
         const double r = length(x_ij);
-        return r > 0 ? (slope(r) / r) * x_ij : Vector{};
+        return r > 0 ? (norm * slope(r) / r) * x_ij : Vector{};
     }
 
 private:
@@ -154,7 +155,22 @@ struct Setting {
     double damping = 0;
     WallLaw law = mirrored;
     std::vector<Vector> motion = {}, next_motion = {}; // m/s of each wall, in this step and the next; none: they stand still
-    Kernel kernel() const { return {how.kernel, how.dimensions, how.h}; }
+    Kernel kernel() const
+    {
+        Kernel k{how.kernel, how.dimensions, how.h};
+        if (how.norm == scene::KernelNorm::Continuum) return k;
+        // On the lattice the gradient of x is 1: sum_j V (x_j - x_i) (x) grad W = 1
+        double moment = 0;
+        const int reach = int(2 * how.h / how.spacing) + 1, across = how.dimensions == 3 ? reach : 0;
+        for (int x = -reach; x <= reach; ++x)
+            for (int y = -across; y <= across; ++y)
+                for (int z = -reach; z <= reach; ++z) {
+                    const Vector x_ij = how.spacing * Vector{double(x), double(y), double(z)};
+                    moment -= volume() * x_ij.x * k.gradient(x_ij).x;
+                }
+        k.norm = 1 / moment;
+        return k;
+    }
     double volume() const { return std::pow(how.spacing, how.dimensions); } // of a particle at reference density
 };
 
@@ -211,14 +227,22 @@ inline double elastic_power(const Material& soil, const Stress& sigma, const Str
     const Stress strain_rate = plus_isotropic((1 / (2 * soil.shear)) * deviator(rate), trace(rate) / (9 * soil.bulk));
     return kuzure::contract(sigma, strain_rate);
 }
-/// L M^-1 with M = sum_j V_j (x_j - x_i) (x) grad W, exact for linear velocity fields: Bonet & Lok (1999). L itself where M is too
-/// lopsided or too empty to be trusted: det M <= 1/2 (tr M/d)^d or tr M/d <= 2/5. In 2-D y counts as the mean of x and z.
-inline Matrix corrected(const Matrix& L, Matrix M, int dimensions)
+/// False where M is too lopsided or too empty to be trusted: det M <= 1/2 (tr M/d)^d or tr M/d <= 2/5. In 2-D y counts as the mean of x
+/// and z.
+inline bool trusted(Matrix M, int dimensions)
 {
     if (dimensions == 2) M.y.y = (M.x.x + M.z.z) / 2;
+    const double det = dot(M.x, cross(M.y, M.z)), mean = trace(M) / 3;
+    return det > 0.5 * mean * mean * mean && mean > 0.4;
+}
+/// L M^-1 with M = sum_j V_j (x_j - x_i) (x) grad W, exact for linear velocity fields: Bonet & Lok (1999). L itself where M is not
+/// to be trusted.
+inline Matrix corrected(const Matrix& L, Matrix M, int dimensions)
+{
+    if (!trusted(M, dimensions)) return L;
+    if (dimensions == 2) M.y.y = (M.x.x + M.z.z) / 2;
     const Vector c0 = cross(M.y, M.z), c1 = cross(M.z, M.x), c2 = cross(M.x, M.y); // columns of det M times M^-1
-    const double det = dot(M.x, c0), mean = trace(M) / 3;
-    if (det <= 0.5 * mean * mean * mean || mean <= 0.4) return L;
+    const double det = dot(M.x, c0);
     const auto times_inverse = [&](Vector row) {
         return (1 / det) * (row.x * Vector{c0.x, c1.x, c2.x} + row.y * Vector{c0.y, c1.y, c2.y} + row.z * Vector{c0.z, c1.z, c2.z});
     };

@@ -107,7 +107,9 @@ protected:
         : unit_(single<V> ? s.h : 1.0), dimensions_(s.dimensions), h_(s.h),
           volume_(s.dimensions == 3 ? s.spacing * s.spacing * s.spacing : s.spacing * s.spacing), model_(M::from(s, unit_)),
           // grad W in 1/m^(dimensions + 1) from sums in units of unit_
-          scale_(model_.kernel.scale / std::pow(unit_, s.dimensions + 1)), fixed_(s.h), water_(PoreWater::from(s.effects))
+          scale_(gradient_norm<typename M::Kernel>(s.norm, s.dimensions, s.h / s.spacing) * model_.kernel.scale /
+                 std::pow(unit_, s.dimensions + 1)),
+          fixed_(s.h), water_(PoreWater::from(s.effects))
     {
     }
     std::string lanes_name() const

@@ -39,8 +39,8 @@ protected:
         U now, next;
     };
     template <class S>
-    using ForceSums =
-        typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm, typename M::CarriedTerm>;
+    using ForceSums = typename M::template WithMore<S, StressForce, typename M::ArtificialStressTerm, typename M::DiffusionTerm,
+                                                    typename M::CarriedTerm, typename M::HourglassTerm>;
     using Wide = WideLanes<W>;
 
     explicit ForceStage(const scene::Interactions& s) : Below(s) {}
@@ -48,9 +48,12 @@ protected:
     /// Geometry: r 3, r.r 5, reciprocal 1, length 1, t 2, F and volume 8, grad W 3. Update: 60.
     Stage force_stage() const
     {
-        return {"force", sizeof(Stresses<T>) + (Below::adjoint() ? sizeof(Traction<T>) : 0) + (M::tensile ? sizeof(Tension<T>) : 0),
+        return {"force",
+                sizeof(Stresses<T>) + (Below::adjoint() ? sizeof(Traction<T>) : 0) + (Below::controls() ? sizeof(Affine<T>) : 0) +
+                    (M::tensile ? sizeof(Tension<T>) : 0),
                 23 + StressForce::flops + M::ArtificialStressTerm::flops + M::DiffusionTerm::flops +
-                    (Below::shifting() ? M::CarriedTerm::flops / Shifting::every : 0) + M::more_flops,
+                    (Below::shifting() ? M::CarriedTerm::flops / Shifting::every : 0) + (Below::controls() ? M::HourglassTerm::flops : 0) +
+                    M::more_flops,
                 60, 25 * 8 + sizeof(Kinematics<T>) + sizeof(Stresses<T>) + 4 * 120.0 / W};
     }
     PassResult run_force(const StepInput& in, std::span<const Index> clusters)
@@ -94,6 +97,19 @@ private:
         const auto narrow = [&](int k) { return load_narrow<V>(s.column[k] + i.first); };
         return {narrow(0), narrow(1), narrow(2), narrow(3), narrow(4), narrow(5)};
     }
+    KUZURE_INLINE static Vec3<V> velocity_of(const StepInput& in, const Cluster<V>& i)
+    {
+        const auto v = std::as_const(*in.particles)[field::velocity];
+        const auto narrow = [&](int k) { return load_narrow<V>(v.column[k] + i.first); };
+        return {narrow(0), narrow(1), narrow(2)};
+    }
+    /// In the hourglass control.
+    KUZURE_INLINE V weight_of(const Cluster<V>& i) const
+    {
+        T w[W];
+        for (int k = 0; k < W; ++k) w[k] = Below::affine_[i.first + std::min(k, i.count - 1)].weight;
+        return load<V>(w);
+    }
     KUZURE_INLINE static bool any(Vec3<V> a)
     {
         const V none(T(0)), most = max(max(abs(a.x), abs(a.y)), abs(a.z));
@@ -109,7 +125,9 @@ private:
         const auto at = Below::lengths();
         const V support = at.support, support2 = at.support2, softening = at.softening, tiny = at.tiny, zero(T(0)), one(T(1));
         const bool tension = Below::in_tension(i, tension_);
-        const bool adjoint = Below::adjoint();
+        const bool adjoint = Below::adjoint(), controls = Below::controls();
+        const Vec3<V> velocity = controls ? velocity_of(in, i) : Vec3<V>{};
+        const V weight = controls ? weight_of(i) : V(T(0));
         const Vec3<V> shift = Below::shift_of(in, i, carries);
         const bool shifted = carries && any(shift);
         Batch<V> batch;
@@ -127,19 +145,25 @@ private:
                     const V t = max(support - inv.root, zero);
                     const V w = model_.kernel.F(t, inv.root, inv.inverse_root) * records[number].volume;
                     e.grad = w * r;
-                    if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                    if constexpr (M::tensile) e.t = t;
+                    if constexpr (M::corrected) e.r = r;
+                    if constexpr (M::corrected && !M::diffusive)
+                        if (controls) e.q = w * (r2 / (r2 + softening));
                     if constexpr (M::diffusive) {
                         e.q = w * (r2 / (r2 + softening));
                         const Vector g = model_.stress_diffusion.gravity;
                         e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
                     }
                 }
-                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f^n (tau_i + tau_j) ] . grad W
+                // rho_i dv/dt = sum_j V_j [ sigma_i + sigma_j + f (tau_i + tau_j) ] . grad W
                 if (adjoint) CorrectedForce{}.add(sums, batch, Below::tractions_.data());
                 else
                     StressForce{}.add(
                         sums, batch, records, [](Sym3<V> s, const Entry<V>&) __attribute__((always_inline)) { return s; });
-                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+                if constexpr (M::tensile)
+                    model_.artificial_stress.add(sums, batch, tension_.data(), tension, model_.artificial_stress.mean);
+                if constexpr (M::corrected)
+                    if (controls) model_.hourglass.add(sums, batch, Below::affine_.data(), neighbours, velocity, weight, V(T(0.5 * unit_)));
                 if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
                 if constexpr (carries)
                     if (shifted) CarriedStress{}.add(sums, batch, records, shift);
@@ -154,9 +178,7 @@ private:
     [[gnu::noinline]] std::int64_t sum_wall_forces(const StepInput& in, const Cluster<V>& i, std::span<const Index> runs,
                                                    const Sym3<V>& sigma, ForceWalls<Wide>& out, WallPower<Wide>* power_out) const
     {
-        const auto v = std::as_const(*in.particles)[field::velocity];
-        const auto narrow = [&](const double* column) { return load_narrow<V>(column + i.first); };
-        const Vec3<V> velocity{narrow(v.column[0]), narrow(v.column[1]), narrow(v.column[2])};
+        const Vec3<V> velocity = velocity_of(in, i);
         ForceWalls<V> sums{};
         WallPower<V> power{};
         sums.nearest = Below::lengths().support2;
@@ -213,16 +235,18 @@ private:
 
         Vec3<U> own = sums.grad_one;
         if (Below::adjoint()) own = was[field::gradient_matrix].template load<U>(lanes.at) * own;
-        const Vec3<U> stress = per_rho * (sums.force + sigma * own);
+        Vec3<U> stress = per_rho * (sums.force + sigma * own);
         Vec3<U> artificial{zero, zero, zero}, wall = artificial, by_loads = artificial;
         if constexpr (M::tensile) {
             const auto tau = lane_by_lane<Sym3, U>([&](int k) {
                 const Tension<T>& t = tension_[lanes.particle(k)];
                 return Stress{t.xx, t.yy, t.zz, t.xy, t.yz, t.xz};
             });
-            artificial = per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
+            stress = stress + per_rho * (tau * sums.closeness_grad + sums.art_stress_j);
         }
         std::apply([&](const auto&... term) { ((artificial = artificial + per_rho * term.force(sums)), ...); }, model_.more);
+        if constexpr (M::corrected)
+            if (Below::controls()) artificial = artificial + per_rho * hourglass(sums, lanes);
         if (M::diffusive || in.shifts) rate_of_stress(in, sums, sigma, soil, lanes);
         if (in.shifted) artificial = artificial + was[field::shift_acceleration].template load<U>(lanes.at);
         if (walled) {
@@ -324,6 +348,17 @@ private:
         const auto kept = p[field::stress_rate];
         if (in.sleep == SleepStage::Frozen) rate = select(written<U>(lanes), rate, kept.template load<U>(lanes.at));
         kept.store(lanes.at, rate, lanes.n);
+    }
+    /// Force of the hourglass control, Pa/m without the kernel's constant.
+    KUZURE_INLINE Vec3<U> hourglass(const ForceSums<U>& sums, const Lanes& lanes) const
+    {
+        const auto of = [&](auto read) { return lane_by_lane<U>([&](int k) { return double(read(Below::affine_[lanes.particle(k)])); }); };
+        using A = const Affine<T>&;
+        const Vec3<U> half = U(0.5 * unit_) * sums.arm;
+        const Vec3<U> x{of([](A a) { return a.xx; }), of([](A a) { return a.xy; }), of([](A a) { return a.xz; })};
+        const Vec3<U> y{of([](A a) { return a.yx; }), of([](A a) { return a.yy; }), of([](A a) { return a.yz; })};
+        const Vec3<U> z{of([](A a) { return a.zx; }), of([](A a) { return a.zy; }), of([](A a) { return a.zz; })};
+        return U(2 * model_.hourglass.strength * h_ / unit_) * (sums.apart - Vec3<U>{dot(x, half), dot(y, half), dot(z, half)});
     }
     KUZURE_INLINE Sym3<U> diffusion(const StepInput& in, const ForceSums<U>& sums, Sym3<U> sigma, const LaneSoil<U>& soil,
                                     const Lanes& lanes) const

@@ -185,7 +185,7 @@ private:
                         e.rho2_Pi = model_.viscosity(pair);
                         sums.viscous_power = fma(e.rho2_Pi * w, approach, sums.viscous_power);
                     }
-                    if constexpr (M::tensile) e.w = model_.kernel.value(t);
+                    if constexpr (M::tensile) e.t = t;
                     if constexpr (M::diffusive) {
                         e.q = w * (r2 * (inv.inverse * rho_sum));
                         const Vector g = model_.stress_diffusion.gravity;
@@ -200,7 +200,7 @@ private:
                         if constexpr (M::viscous) return plus_isotropic(s, -e.rho2_Pi);
                         else return s;
                     });
-                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension);
+                if constexpr (M::tensile) model_.artificial_stress.add(sums, batch, tension_.data(), tension, 0);
                 if constexpr (M::diffusive) model_.stress_diffusion.add(sums, batch, records);
                 if constexpr (M::corrected) model_.correction.add(sums, batch);
             });
@@ -371,7 +371,7 @@ private:
             if (model_.correct) {
                 const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
                 const Sym3<U> correction =
-                    GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - load<U>(share.walled + lanes.first));
+                    GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - load<U>(share.walled + lanes.first)).K;
                 r.L = {correction * r.L.x, correction * r.L.y, correction * r.L.z};
             }
         const auto material = [&](int k) -> const Material& {

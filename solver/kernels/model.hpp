@@ -2,6 +2,7 @@
 // A model is a smoothing kernel and the terms of the pair loop: its type says what the loop contains.
 #include "solver/effects/artificial_stress.hpp"
 #include "solver/effects/gradient_correction.hpp"
+#include "solver/effects/hourglass.hpp"
 #include "solver/effects/shifting.hpp"
 #include "solver/effects/stress_diffusion.hpp"
 #include "solver/effects/viscosity.hpp"
@@ -25,11 +26,13 @@ struct Model {
     using ShiftingTerm = Shifted;
     static constexpr bool viscous = !std::is_same_v<Viscous, NoViscosity>;
     static constexpr bool tensile = std::is_same_v<Tensile, ArtificialStress>;
+    using TensionTerm = std::conditional_t<tensile, StrainOfTension, NoStrainOfTension>;
     static constexpr bool diffusive = std::is_same_v<Diffusive, StressDiffusion>;
     static constexpr bool corrected = std::is_same_v<Corrected, GradientCorrection>;
     static constexpr bool shifts = std::is_same_v<Shifted, Shifting>;
+    using HourglassTerm = std::conditional_t<corrected, HourglassControl, NoHourglass>;
     using CarriedTerm = std::conditional_t<shifts, CarriedStress, NothingCarried>;
-    static constexpr bool pushes = tensile || shifts || sizeof...(More) > 0;
+    static constexpr bool pushes = shifts || corrected || sizeof...(More) > 0;
     static constexpr double more_flops = (0.0 + ... + More::flops);
     template <class S, class... Terms> using WithMore = SumsOf<S, Terms..., More...>;
     Kernel kernel;
@@ -37,8 +40,9 @@ struct Model {
     Tensile artificial_stress;
     Diffusive stress_diffusion;
     Corrected correction;
-    bool correct; // a model with the correction compiled in also serves scenes without
-    bool adjoint; // pair forces by the corrected gradients too
+    bool correct;               // a model with the correction compiled in also serves scenes without
+    bool adjoint;               // pair forces by the corrected gradients too
+    HourglassControl hourglass; // of models with the correction
     Shifted shifting;
     std::tuple<More...> more;
 
@@ -47,11 +51,12 @@ struct Model {
         const Kernel kernel(s.h / unit, s.dimensions);
         return {kernel,
                 Viscous::from(s.effects, kernel.h),
-                Tensile::from(s.effects, kernel, s.spacing / unit),
+                Tensile::from(s.effects, kernel, s.spacing / unit, s.dimensions),
                 Diffusive::from(s.effects),
                 {},
                 s.correction != scene::Correction::None,
                 s.correction == scene::Correction::Adjoint,
+                {s.hourglass},
                 Shifted::from(s.shifting, kernel, s.spacing / unit),
                 {More::from(s, unit)...}};
     }
@@ -62,7 +67,7 @@ struct Model {
                           : std::is_same_v<Kernel, WendlandC2> ? asked == scene::Kernel::WendlandC2
                                                                : asked == scene::Kernel::WendlandC4;
         return same && Viscous::covers(s.effects) && (tensile || !s.effects.artificial_stress) &&
-               (diffusive || !s.effects.stress_diffusion) && (corrected || s.correction == scene::Correction::None) &&
+               (diffusive || !s.effects.stress_diffusion) && (corrected || (s.correction == scene::Correction::None && s.hourglass == 0)) &&
                (shifts || s.shifting == 0);
     }
     static std::string name()

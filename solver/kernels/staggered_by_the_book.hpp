@@ -6,10 +6,11 @@
 //     strain   x, v, rho, sigma after the move; all distances half a step back, r_ij = x_ij - dt/2 (v_ij + w_ij):
 //              L_i = sum_j V_j (v_j - v_i) (x) grad W - sum_w V_w 2 P_w v_i (x) grad W,  w points of walls,
 //              b_i = -1/rho_i sum_j V_j rho_i rho_j Pi_ij grad W  (of walls: v_iw = 2 P_w v_i, and of the force P_w)
+//              D_i = sym L_i - epsilon N_i sym[sum_j V_j f_ij (v_j - v_i) (x) grad W] N_i in tension, of effects/artificial_stress.hpp
 //              sigma, rho by a whole step: half of the loading before the turn and half after
 //              where particles are shifted, w_i = -n C h^2 gamma' k_i grad C_i of effects/shifting.hpp for the step to come, in one of n =
-//              4
-//     force    a_i = b_i + g + 1/rho_i sum_j V_j [sigma_i + sigma_j + f^n (tau_i + tau_j)] . grad W
+//              8
+//     force    a_i = b_i + g + 1/rho_i sum_j V_j [sigma_i + sigma_j + f_ij (tau_i + tau_j)] . grad W
 //                    + 1/rho_i sum_w V_w 2 P_w (sigma_i . grad W) + friction;  v_i += dt/2 a_i
 //              a_i += L_i w_i of the step before; sum_j V_j (sigma_j - sigma_i) (w_i . grad W) is a stress rate of the next strain
 //              of soil behind the face of real ground that its nearest point there mirrors it at, by a depth of d: also
@@ -231,12 +232,42 @@ struct Strain {
     Matrix K{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; // correction of gradients
     Vector crowd{};                            // grad C of near neighbours, 1/m
     double inside = 0;                         // tr M/d, walls among the neighbours
+    Stress near_tension{};                     // sym sum_j V_j f (v_j - v_i) (x) grad W, 1/s
+    double sees_all = 0;                       // 1 where L has all of an affine motion, in part 0 near surfaces
 };
 /// 0.2 (W/W(spacing))^4: near neighbours count. Lind et al. (2012), eq. 26.
 inline double crowding(const Kernel& kernel, double spacing, double r)
 {
     return 0.2 * std::pow(kernel.value(r) / kernel.value(spacing), 4);
 }
+/// The conservative artificial stress: f_ij = (W/W(spacing))^n - m and tau = -epsilon' <sigma_k> n_k n_k, epsilon' = epsilon/(1 - epsilon
+/// m), with m by which sum_j V_j f x dW/dx = 0 on the lattice.
+struct NearTension {
+    double epsilon = 0, exponent = 1, mean = 0; // epsilon', n, m
+    static NearTension of(const Setting& s)
+    {
+        NearTension t;
+        if (!s.how.effects.artificial_stress) return t;
+        t.exponent = s.how.effects.artificial_stress->exponent;
+        const Kernel kernel = s.kernel();
+        const int reach = int(2 * s.how.h / s.how.spacing) + 1, across = s.how.dimensions == 3 ? reach : 0;
+        double near = 0, all = 0;
+        for (int x = -reach; x <= reach; ++x)
+            for (int y = -across; y <= across; ++y)
+                for (int z = -reach; z <= reach; ++z) {
+                    const Vector r = s.how.spacing * Vector{double(x), double(y), double(z)};
+                    const double weight = r.x * kernel.gradient(r).x;
+                    near += weight * t.f(kernel, s.how.spacing, length(r)), all += weight;
+                }
+        t.mean = near / all;
+        t.epsilon = s.how.effects.artificial_stress->epsilon / (1 - s.how.effects.artificial_stress->epsilon * t.mean);
+        return t;
+    }
+    double f(const Kernel& kernel, double spacing, double r) const
+    {
+        return std::pow(kernel.value(r) / kernel.value(spacing), exponent) - mean;
+    }
+};
 inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> kept, std::span<const GroundPoint> points, const Setting& s,
                         double dt)
 {
@@ -249,6 +280,7 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
         return j;
     };
     const Particle here = at_mid_step(i, kept[k].shift);
+    const auto near = NearTension::of(s);
     Strain of_i;
     Matrix M{}, sliding{};
     Vector pressure{}; // sum V_j rho_i rho_j Pi grad W
@@ -258,6 +290,9 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
         const Vector grad = kernel.gradient(here.x - j.x);
         of_i.L = of_i.L + j.volume * outer(j.v - i.v, grad);
         M = M + j.volume * outer(j.x - here.x, grad);
+        if (near.epsilon > 0)
+            of_i.near_tension =
+                of_i.near_tension + j.volume * near.f(kernel, s.how.spacing, length(here.x - j.x)) * symmetric_part(outer(j.v - i.v, grad));
         of_i.crowd = of_i.crowd + (j.volume * crowding(kernel, s.how.spacing, length(here.x - j.x))) * grad;
         if (viscous) pressure = pressure + (j.volume * i.density * j.density * viscosity(*viscous, s.how.h, here, j, i.v - j.v)) * grad;
     }
@@ -292,6 +327,9 @@ inline Strain strain_of(std::size_t k, const Soil& soil, std::span<const Kept> k
     // Mirrored velocities are not linear: beside a wall the plain gradient is kept.
     if (s.how.correction != scene::Correction::None && !of_i.beside_wall)
         of_i.L = corrected(of_i.L, M, s.how.dimensions), of_i.K = corrected(of_i.K, M, s.how.dimensions);
+    of_i.sees_all = s.how.correction != scene::Correction::None && !of_i.beside_wall && trusted(M, s.how.dimensions)
+                        ? 1
+                        : std::clamp((trace(M) / s.how.dimensions - 0.75) / 0.15, 0.0, 1.0);
     // Wall points have the volume of mid-step, V (1 + dt/2 tr L); that of soil which has opened stays V.
     if (!(kept[k].opened > 0)) of_i.L_walls = (1 + dt / 2 * (trace(of_i.L) + trace(of_i.L_walls))) * of_i.L_walls;
     of_i.L = of_i.L + of_i.L_walls;
@@ -305,16 +343,20 @@ struct Strained {
     double density, plastic_strain, opened;
     double plastic, stabilising, wall;
     Vector shift{}, shift_acceleration{}; // m/s, m/s^2
+    double weight = 0;                    // in the hourglass control, kg/(m^2 s)
 };
 inline Strained strained(const Particle& i, const Material& soil, const Kept& kept, const Strain& strain, const Setting& s, double dt)
 {
-    const Stress D = symmetric_part(strain.L);
+    Stress D = symmetric_part(strain.L);
     auto law = Elastoplastic<double>::from(soil);
+    if (const auto near = NearTension::of(s); tension(i.stress, near.epsilon) != Stress{})
+        D = D - near.epsilon * tensile_part(i.stress + hooke((dt / 2) * D, law), strain.near_tension);
     if (soil.evolves())
         law =
             evolved(law, Evolution<double>::from(soil, s.how.h), kept.plastic_strain, std::sqrt(4 * J2(deviator(D))), -trace(i.stress) / 3);
     const Stress loading = (dt / 2) * (hooke(D, law) + kept.stress_rate);
     const auto mapped = return_to_cone(rotate(spin_increment(strain.L, dt), i.stress + loading) + loading, law, kept.opened);
+    const bool holds = mapped.d_lambda <= 0 && mapped.opened <= 0;
     // d rho/dt = -rho (tr L - d opened/dt): (rho' - rho)/dt = -(tr L - d opened/dt) (rho' + rho)/2
     const double change = dt / 2 * trace(strain.L) - (mapped.opened - kept.opened) / 2;
     Strained next{mapped.sigma, i.density * (1 - change) / (1 + change), kept.plastic_strain + mapped.d_lambda, mapped.opened, 0, 0, 0};
@@ -326,6 +368,7 @@ inline Strained strained(const Particle& i, const Material& soil, const Kept& ke
     next.plastic = volume * (dt * kuzure::contract(mean, D) + diffused - stored);
     next.stabilising = -volume * diffused;
     next.wall = -volume * dt * contract(mean, strain.L_walls);
+    next.weight = holds ? strain.sees_all * (dt > 0 ? next.density : i.density) * soil.c_p : 0;
     if (s.how.shifting == 0) return next;
     // The way beside the velocity changes the potential energy.
     const Vector weight = s.how.effects.gravity.value_or(Vector{}) + (-1 / soil.density) * PoreWater::from(s.how.effects).at(i.x).gradient;
@@ -351,13 +394,27 @@ struct Forced {
     enum class Contact { None, Presses, Approached, LetGo } contact = Contact::None; // with Coulomb faces
     enum class Rubs { Not, Sticks, Slides } rubs = Rubs::Not;
 };
-/// `K`: corrections of pair forces; none: they are not corrected. `kept.acceleration` is the viscous one of this step; dt is its length,
-/// `next` that of the one to come, s.
-inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const Matrix> K, std::span<const GroundPoint> points,
-                       const Setting& s, double dt, double next)
+/// What the hourglass control knows of a particle: its velocity gradient, 1/s, and its weight.
+struct Affine {
+    Matrix L;
+    double weight;
+};
+/// Against the part of v_ij that neither velocity gradient tells of: 2 xi h min(w_i, w_j) V_j (v_ij - (L_i + L_j) x_ij/2)
+/// (x_ij . grad W)/(r^2 + 0.01 h^2), N/m^3. Zhang et al. (2024).
+inline Vector hourglass_force(double xi, double h, const Particle& i, const Particle& j, const Affine& of_i, const Affine& of_j,
+                              Vector grad)
+{
+    const Vector x_ij = i.x - j.x, apart = (i.v - j.v) - 0.5 * ((of_i.L + of_j.L) * x_ij);
+    return (2 * xi * h * std::min(of_i.weight, of_j.weight) * j.volume * dot(x_ij, grad) / (dot(x_ij, x_ij) + 0.01 * h * h)) * apart;
+}
+/// `K`: corrections of pair forces; none: they are not corrected. `affine` as K. `kept.acceleration` is the viscous one of this step; dt is
+/// its length, `next` that of the one to come, s.
+inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::span<const Matrix> K, std::span<const Affine> affine,
+                       std::span<const GroundPoint> points, const Setting& s, double dt, double next)
 {
     const Kernel kernel = s.kernel();
     const scene::Effects& e = s.how.effects;
+    const auto near = NearTension::of(s);
     const Material& material = s.soils[std::size_t(soil.soil[k])];
     const Particle i = particle(soil, k, s);
     const Vector gravity = e.gravity.value_or(Vector{});
@@ -383,7 +440,10 @@ inline Forced force_on(std::size_t k, const Soil& soil, const Kept& kept, std::s
         // sigma_i K_i + sigma_j K_j, adjoint to the strain's K_i grad W
         stress = stress + j.volume * (K.empty() ? (i.stress + j.stress) * grad : i.stress * (K[k] * grad) + j.stress * (K[l] * grad));
         inward = inward + 2 * j.volume * grad;
-        if (e.artificial_stress) art = art + j.volume * (artificial_stress(*e.artificial_stress, kernel, s.how.spacing, i, j) * grad);
+        if (near.epsilon > 0)
+            stress = stress + j.volume * near.f(kernel, s.how.spacing, length(x_ij)) *
+                                  ((tension(i.stress, near.epsilon) + tension(j.stress, near.epsilon)) * grad);
+        if (s.how.hourglass > 0) art = art + hourglass_force(s.how.hourglass, s.how.h, i, j, affine[k], affine[l], grad);
         if (e.stress_diffusion)
             of_i.stress_rate = of_i.stress_rate + stress_diffusion(e.stress_diffusion->zeta, s.how.h, gravity, material, i, j, grad);
         if (s.how.shifting > 0) of_i.stress_rate = of_i.stress_rate + (j.volume * dot(kept.shift, grad)) * (j.stress - i.stress);

@@ -30,6 +30,10 @@ template <class T> Traction<T> make_traction(const Stress& s, const Stress& K)
     const Vector x = K * Vector{s.xx, s.xy, s.xz}, y = K * Vector{s.xy, s.yy, s.yz}, z = K * Vector{s.xz, s.yz, s.zz};
     return {T(x.x), T(x.y), T(x.z), T(y.x), T(y.y), T(y.z), T(z.x), T(z.y), T(z.z), {}};
 }
+/// Velocity gradient of its strain, 1/s, and its weight in the hourglass control; only runs with that read and write it.
+template <class T> struct alignas(4 * sizeof(T)) Affine {
+    T xx, xy, xz, yx, yy, yz, zx, zy, zz, weight, spare[2];
+};
 /// How it is shifted beside that, m/s; only models that shift particles read and write it.
 template <class T> struct alignas(4 * sizeof(T)) ShiftOf {
     T x, y, z, spare;
@@ -58,7 +62,8 @@ public:
     {
         return kinematics_.capacity() * sizeof(Kinematics<T>) + stresses_.capacity() * sizeof(Stresses<T>) +
                tension_.capacity() * sizeof(Tension<T>) + shifts_.capacity() * sizeof(ShiftOf<T>) +
-               tractions_.capacity() * sizeof(Traction<T>) + speed_.capacity() * sizeof(T) + wall_bytes();
+               tractions_.capacity() * sizeof(Traction<T>) + affine_.capacity() * sizeof(Affine<T>) + speed_.capacity() * sizeof(T) +
+               wall_bytes();
     }
 
     void make_records(const Particles& p, std::span<const Material> soils, std::span<const std::int32_t> ghost_soil) override
@@ -69,6 +74,7 @@ public:
         if (M::tensile) tension_.resize(count);
         if (shifting()) shifts_.resize(count);
         if (adjoint()) tractions_.resize(count);
+        if (controls()) affine_.assign(count, {}); // the strain of each step writes them
         if (soils.size() > 1) speed_.resize(count);
         const bool sleepy = p.has(field::activity);
 #pragma omp parallel for schedule(static)
@@ -80,7 +86,7 @@ public:
             kinematics_[i] = {fixed_(x.x), fixed_(x.y), fixed_(x.z), T(v.x), T(v.y), T(v.z), T(volume), T(rho)};
             const bool awake = sleepy && p[field::activity][i] == std::int32_t(Activity::Moves);
             stresses_[i] = {T(s.xx), T(s.yy), T(s.zz), T(s.xy), T(s.yz), T(s.xz), T(volume), T(awake)};
-            if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.epsilon);
+            if constexpr (M::tensile) tension_[i] = make_tension<T>(s, model_.artificial_stress.adjoint_epsilon);
             if (shifting()) shifts_[i] = shift_of(p[field::shift][i]);
             if (adjoint()) tractions_[i] = make_traction<T>(s, p[field::gradient_matrix][i]);
         }
@@ -162,6 +168,7 @@ public:
         }
         std::memcpy(to, &stresses_[owned], sizeof(Stresses<T>)), to += sizeof(Stresses<T>);
         if (adjoint()) std::memcpy(to, &tractions_[owned], sizeof(Traction<T>)), to += sizeof(Traction<T>);
+        if (controls()) std::memcpy(to, &affine_[owned], sizeof(Affine<T>)), to += sizeof(Affine<T>);
         if constexpr (M::tensile) std::memcpy(to, &tension_[owned], sizeof(Tension<T>));
     }
     void unpack(int stage, Index slot, const std::byte* from) override
@@ -173,6 +180,7 @@ public:
         }
         std::memcpy(&stresses_[n_ + slot], from, sizeof(Stresses<T>)), from += sizeof(Stresses<T>);
         if (adjoint()) std::memcpy(&tractions_[n_ + slot], from, sizeof(Traction<T>)), from += sizeof(Traction<T>);
+        if (controls()) std::memcpy(&affine_[n_ + slot], from, sizeof(Affine<T>)), from += sizeof(Affine<T>);
         if constexpr (M::tensile) std::memcpy(&tension_[n_ + slot], from, sizeof(Tension<T>));
     }
     void end_stage(int) override {}
@@ -225,6 +233,12 @@ protected:
     bool adjoint() const
     {
         if constexpr (M::corrected) return model_.adjoint;
+        else return false;
+    }
+    /// True where this run controls hourglass motion.
+    bool controls() const
+    {
+        if constexpr (M::corrected) return model_.hourglass.strength > 0;
         else return false;
     }
     /// True where this run shifts particles: a model that can also serves scenes without.
@@ -306,6 +320,7 @@ protected:
     Array<Tension<T>> tension_;
     Array<ShiftOf<T>> shifts_;
     Array<Traction<T>> tractions_;
+    Array<Affine<T>> affine_;
     Array<T> speed_; // c_p by record, where there are several soils
 };
 

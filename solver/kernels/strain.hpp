@@ -3,6 +3,7 @@
 // force, which waits in the acceleration's column for the force stage.
 #include "solver/kernels/staggered_records.hpp"
 #include "solver/walls/friction.hpp"
+#include <algorithm>
 
 namespace kuzure {
 
@@ -27,7 +28,8 @@ protected:
     template <class S> struct ViscousPower {
         S now, next;
     };
-    template <class S> using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm, typename M::ShiftingTerm>;
+    template <class S>
+    using StrainSums = SumsOf<S, VelocityGradient, Viscous, typename M::CorrectionTerm, typename M::ShiftingTerm, typename M::TensionTerm>;
     using Wide = WideLanes<W>;
 
     explicit StrainStage(const scene::Interactions& s) : Below(s) {}
@@ -53,6 +55,7 @@ private:
         Cluster<V> i = Below::cluster_at(in, cluster, tally);
         if (i.moving == 0) { // its list is pruned when it wakes
             if (in.prune) in.lists->pruned(cluster).n = -1;
+            if (Below::controls()) std::fill_n(&Below::affine_[i.first], i.count, Affine<T>{});
             return;
         }
         Below::load_lanes(i, in, kinematics_.data(), [&](Index k) { return speed_[k]; });
@@ -97,6 +100,7 @@ private:
         [[maybe_unused]] const bool shifted = in.shifted, decides = in.shifts;
         const ShiftOf<T>* shifts = Below::shifts_.data();
         const Vec3<V> own = Below::shift_of(in, i, in.shifted);
+        const bool tension = Below::in_tension(i, tension_);
         Batch<V> batch;
         StrainSums<V> sums{};
         Below::for_each_batch(
@@ -123,12 +127,15 @@ private:
                         e.rho2_Pi = model_.viscosity(Pair<V>{approach, inv.inverse, rho_sum, i.rho, V(j.density), i.c, c});
                     }
                     if constexpr (M::corrected || shifting) e.r = r;
+                    if constexpr (M::tensile) e.t = t;
                     if constexpr (shifting)
                         if (decides) e.w = model_.kernel.value(t);
                 }
                 VelocityGradient{}.add(sums, batch);
                 Viscous{}.add(sums, batch);
                 if constexpr (M::corrected) model_.correction.add(sums, batch);
+                if constexpr (M::tensile)
+                    if (tension) StrainOfTension{}.add(sums, batch, model_.artificial_stress);
                 if constexpr (shifting)
                     if (decides) model_.shifting.add(sums, batch);
             });
@@ -256,13 +263,17 @@ private:
             }
             friction_lags(in, lanes, rubbing, soil.c);
         }
-        if constexpr (M::corrected)
+        U sees_all = zero; // of the hourglass control: 1 where L has all of an affine motion
+        if constexpr (M::corrected) {
+            const Sym3<U> moment = U(-unit_) * factor * sums.moment; // the sums hold r = x_i - x_j in `unit`
+            if (Below::controls()) sees_all = Shifting::inside(U(1.0 / dimensions_) * trace(moment));
             if (model_.correct) {
-                const U to_m = U(-unit_) * factor; // the sums hold r = x_i - x_j in `unit`
-                const Sym3<U> correction = GradientCorrection::inverse(to_m * sums.moment, dimensions_, one - feels_wall);
+                const auto [correction, trusted] = GradientCorrection::inverse(moment, dimensions_, one - feels_wall);
+                sees_all = max(sees_all, trusted);
                 L = {correction * L.x, correction * L.y, correction * L.z};
                 if (model_.adjoint) keep_correction(in, lanes, correction);
             }
+        }
         const U opened = in.remembering ? was[field::opened_volume].template load<U>(lanes.at) : zero;
         if (walled) {
             // with the volume of mid-step, as the forces of both ends have it in the mean: else walls would give energy
@@ -272,7 +283,8 @@ private:
         }
         L = {L.x + at_walls.x, L.y + at_walls.y, L.z + at_walls.z};
 
-        const Sym3<U> D = symmetric_part(L);
+        Sym3<U> D = symmetric_part(L);
+        if constexpr (M::tensile) D = D - less_in_tension(sums, sigma + hooke(half_dt * D, soil.law), lanes); // of mid-step
         if (in.evolving) soil.law = cone_of_now(soil.law, in.soils, was[field::soil].column[0], lanes, h_, plastic, D, sigma);
         Sym3<U> diffusion{zero, zero, zero, zero, zero, zero};
         if (M::diffusive || in.shifted) diffusion = was[field::stress_rate].template load<U>(lanes.at);
@@ -283,12 +295,26 @@ private:
         // drho/dt = -rho tr L, by the midpoint rule, but for what opens and closes: the soil between the gaps keeps its density
         const U change = half_dt * trace(L) - half * (mapped.opened - opened);
         Strained next{mapped.sigma, rho * ((one - change) / (one + change)), plastic + mapped.d_lambda, viscous};
+        if (Below::controls()) {
+            const U yields = mapped.d_lambda + mapped.opened, holds = select(less(zero, yields), zero, one);
+            write_affine(in, lanes, L, holds * sees_all * (in.dt > 0 ? next.rho : rho) * soil.c);
+        }
         if (in.shifts || in.shifted) shift(in, soil_sums, wall_sums, walled, lanes, soil, rho, L, mapped.d_lambda, tally);
 
         keep_strained(in, lanes, Strained{sigma, rho, plastic, viscous}, opened, next, mapped.opened);
         write_stresses(in, lanes, soil, next);
 
         report(in, lanes, Strain{sigma, next.sigma, rho, next.rho, D, diffusion, at_walls}, soil, walled, tally);
+    }
+    /// epsilon N [sum_j V_j f (v_j - v_i) (x) grad W] N: what the strain of soil in tension is less by.
+    KUZURE_INLINE Sym3<U> less_in_tension(const StrainSums<U>& sums, const Sym3<U>& sigma, const Lanes& lanes) const
+    {
+        const Sym3<U> near = U(model_.artificial_stress.adjoint_epsilon * scale_) * symmetric_part(sums.near_grad_v);
+        const auto at = [](const Sym3<U>& s, int k) {
+            return Stress{lane(s.xx, k), lane(s.yy, k), lane(s.zz, k), lane(s.xy, k), lane(s.yz, k), lane(s.xz, k)};
+        };
+        return lane_by_lane<Sym3, U>(
+            [&](int k) { return tension_[lanes.particle(k)].any == 0 ? Stress{} : tensile_part(at(sigma, k), at(near, k)); });
     }
     /// The way beside its velocity that a particle goes in the step to come, and what this step's has changed: its velocity, and its
     /// potential energy, which is booked here whole.
@@ -375,6 +401,18 @@ private:
         const U next = fma(of.keep, was, of.take * rubbing);
         limit.store(lanes.at, in.sleep == SleepStage::Frozen ? select(written<U>(lanes), next, was) : next, lanes.n);
     }
+    /// What the force stage's hourglass control reads; sleepers have none.
+    KUZURE_INLINE void write_affine(const StepInput& in, const Lanes& lanes, const Mat3<U>& L, U weight)
+    {
+        if (in.sleep == SleepStage::Frozen) weight = select(written<U>(lanes), weight, U(0.0));
+        double fields[10][width<U>];
+        const U columns[10] = {L.x.x, L.x.y, L.x.z, L.y.x, L.y.y, L.y.z, L.z.x, L.z.y, L.z.z, weight};
+        for (int k = 0; k < 10; ++k) store(fields[k], columns[k]);
+        for (int k = 0; k < lanes.n; ++k) {
+            const auto at = [&](int c) { return T(fields[c][k]); };
+            Below::affine_[lanes.at + k] = {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), {}};
+        }
+    }
     KUZURE_INLINE void write_stresses(const StepInput& in, const Lanes& lanes, const LaneSoil<U>& soil, const Strained& next)
     {
         double fields[7][width<U>];
@@ -395,7 +433,7 @@ private:
             if constexpr (M::tensile)
                 tension_[lanes.at + k] =
                     make_tension<T>(Stress{fields[0][k], fields[1][k], fields[2][k], fields[3][k], fields[4][k], fields[5][k]},
-                                    model_.artificial_stress.epsilon);
+                                    model_.artificial_stress.adjoint_epsilon);
         }
     }
 };

@@ -12,6 +12,7 @@ template <class V> struct Entry {
     Vec3<V> r;    // x_i - x_j
     V rho2_Pi;    // rho_i rho_j Pi_ij, Pa
     V w;          // W_ij
+    V t;          // 2h - r where positive, else 0
     V q;          // (grad W . r)/(r^2 + 0.01 h^2), as grad
     V along;      // g . r
 };

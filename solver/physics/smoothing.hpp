@@ -6,6 +6,8 @@
 //
 // so that the constant is taken out of the sums. F is exactly zero beyond the support. Only a kernel that `divides` is given 1/r.
 #include "solver/core/scalar.hpp"
+#include "solver/scene/parts.hpp"
+#include <cmath>
 #include <numbers>
 
 namespace kuzure {
@@ -77,5 +79,26 @@ struct WendlandC4 {
         return V(number<V>(a)) * (f2 * f2 * f2) * fma(q, fma(q, V(number<V>(35.0 / 12)), V(3)), V(1));
     }
 };
+
+/// -sum_j V_j x_ij dW/dx over a cubic (square) lattice of spacing 1 around one of its points, for a kernel of h in spacings: what its
+/// gradients make of a linear field, 1 of infinitely many neighbours.
+template <class Kernel> double lattice_moment(const Kernel& kernel, int dimensions)
+{
+    const int reach = int(2 * kernel.h) + 1, across = dimensions == 3 ? reach : 0;
+    double sum = 0;
+    for (int x = -reach; x <= reach; ++x)
+        for (int y = -reach; y <= reach; ++y)
+            for (int z = -across; z <= across; ++z) {
+                const double r = std::sqrt(double(x * x + y * y + z * z));
+                if (r > 0) sum -= kernel.scale * kernel.F(std::max(2 * kernel.h - r, 0.0), r, 1 / r) * x * x;
+            }
+    return sum;
+}
+/// What gradients are multiplied by: 1/lattice_moment, by which those of linear fields are exact on the lattice (in soil that has flowed
+/// to 0.4 %: docs/theory.md), or 1.
+template <class Kernel> double gradient_norm(scene::KernelNorm norm, int dimensions, double h_in_spacings)
+{
+    return norm == scene::KernelNorm::Continuum ? 1.0 : 1 / lattice_moment(Kernel(h_in_spacings, dimensions), dimensions);
+}
 
 } // namespace kuzure

@@ -14,27 +14,18 @@ namespace kuzure {
 
 double unit_pressure(const Scene& scene)
 {
-    const int d = scene.dimensions, reach = int(2 * scene.space.h) + 1;
+    if (scene.accuracy.kernel_norm == scene::KernelNorm::Lattice) return 1; // its gradients are exact there
+    const int d = scene.dimensions;
     const double h = scene.space.h; // lengths in spacings
-    const auto moment = [&](const auto& kernel) {
-        double sum = 0;
-        for (int x = -reach; x <= reach; ++x)
-            for (int y = -reach; y <= reach; ++y)
-                for (int z = d == 3 ? -reach : 0; z <= (d == 3 ? reach : 0); ++z) {
-                    const double r = std::sqrt(double(x * x + y * y + z * z));
-                    if (r > 0) sum -= kernel.scale * kernel.F(std::max(2 * h - r, 0.0), r, 1 / r) * x * x;
-                }
-        return sum;
-    };
     switch (scene.accuracy.kernel) {
     case scene::Kernel::CubicSpline:
-        return 1 / moment(CubicSpline(h, d));
+        return 1 / lattice_moment(CubicSpline(h, d), d);
     case scene::Kernel::WendlandC2:
-        return 1 / moment(WendlandC2(h, d));
+        return 1 / lattice_moment(WendlandC2(h, d), d);
     case scene::Kernel::WendlandC4:
         break;
     }
-    return 1 / moment(WendlandC4(h, d));
+    return 1 / lattice_moment(WendlandC4(h, d), d);
 }
 
 std::vector<LoadNow> loads_now(const Scene& scene)

@@ -72,6 +72,10 @@ void check_time(const Scene& scene, StepLimit limit, Rules& rules)
         rules.error("accuracy.shifting", text("expected 0, found {}: the leap-frog scheme shifts no particles. Remedy: "
                                               "accuracy.scheme = \"staggered\", or no shifting",
                                               scene.accuracy.shifting));
+    if (scene.accuracy.hourglass > 0 && scene.accuracy.scheme == Scheme::LeapFrog)
+        rules.error("accuracy.hourglass", text("expected 0, found {}: the leap-frog scheme has no hourglass control. Remedy: "
+                                               "accuracy.scheme = \"staggered\", or no control",
+                                               scene.accuracy.hourglass));
     if (scene.accuracy.sleep_below > 0 && sleep_interval(scene) < 3)
         rules.warning("accuracy.sleep_below",
                       "nothing will sleep: in steps this long a P-wave crosses half a support; 0, or a smaller step");

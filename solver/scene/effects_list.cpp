@@ -164,6 +164,10 @@ private:
                  ? text("constant {:.3g}: soil that shears plastically keeps an even spacing, stress and velocity are carried along",
                         shifting)
                  : "accuracy.shifting = 0");
+        const double hourglass = scene_.accuracy.hourglass;
+        note("hourglass", hourglass > 0,
+             hourglass > 0 ? text("strength {:.3g}: in soil that does not yield neighbours move as the velocity gradient says", hourglass)
+                           : "accuracy.hourglass = 0");
         const double slow = scene_.accuracy.sleep_below;
         note("sleep", slow > 0,
              slow > 0 ? text("soil slower than {:.3g} m/s among soil as slow keeps its state, looked at every {} steps", slow,

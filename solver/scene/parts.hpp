@@ -173,6 +173,8 @@ struct EffectNote {
 
 // ---- what decides between pair models ----
 enum class Kernel { CubicSpline, WendlandC2, WendlandC4 };
+/// What gradients of linear fields are exact on: particles on their lattice, or infinitely many of them (as published).
+enum class KernelNorm { Lattice, Continuum };
 enum class Precision { Double, Mixed };
 /// Of kernel gradients at free surfaces: in the velocity gradient alone, or in the pair forces too.
 enum class Correction { None, Gradient, Adjoint };
@@ -189,6 +191,8 @@ struct Interactions {
     Correction correction;
     Scheme scheme = Scheme::Staggered;
     double shifting = 0; // constant of the shifting of particles; 0: none
+    KernelNorm norm = KernelNorm::Lattice;
+    double hourglass = 0; // strength of the hourglass control; 0: none
 };
 
 } // namespace kuzure::scene

@@ -73,8 +73,8 @@ void check_space(const Scene& scene, Rules& rules)
     }
     if (scene.accuracy.kernel == Kernel::CubicSpline && space.h > 1.25)
         rules.warning("space.h", text("with the cubic spline, soil at rest swings in rows of alternating velocity above h = 1.25 "
-                                      "spacings, and pairs up above 1.5; found {}. Use 1.2, or a wendland kernel, which does neither",
-                                      space.h));
+                                      "spacings, and pairs up above 1.5; found {}. Use 1.2, or a wendland kernel, which does neither{}",
+                                      space.h, scene.accuracy.hourglass > 0 ? "" : "; or accuracy.hourglass = 0.1, against the rows"));
 }
 
 void check_bodies(const Scene& scene, Rules& rules)

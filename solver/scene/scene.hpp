@@ -10,11 +10,13 @@ enum class Preset { Seed, Fast, Standard, Accurate };
 struct Accuracy {
     Preset preset = Preset::Standard;
     Kernel kernel = Kernel::WendlandC2;
+    KernelNorm kernel_norm = KernelNorm::Lattice;
     double cfl = 1.0;
     Scheme scheme = Scheme::Staggered;
     Precision precision = Precision::Double;
     Correction correction = Correction::None;
     double shifting = 0;    // constant C of the shifting of particles in plastic flow; 0: none
+    double hourglass = 0;   // strength xi of the hourglass control in soil that does not yield; 0: none
     double skin = 0.2;      // list skin in support radii (2 h): cost only, results change in their last bits
     double sleep_below = 0; // m/s; soil that is slower, among soil that is slower, sleeps; 0: never
     bool operator==(const Accuracy&) const = default;
@@ -196,8 +198,9 @@ struct Scene {
     }
     scene::Interactions interactions() const
     {
-        return {dimensions,         space.spacing,       smoothing_length(), effects,          accuracy.kernel,
-                accuracy.precision, accuracy.correction, accuracy.scheme,    accuracy.shifting};
+        return {dimensions,        space.spacing,        smoothing_length(),  effects,
+                accuracy.kernel,   accuracy.precision,   accuracy.correction, accuracy.scheme,
+                accuracy.shifting, accuracy.kernel_norm, accuracy.hourglass};
     }
     bool operator==(const Scene&) const = default;
 };

@@ -71,7 +71,8 @@ double courant_limit(const Scene& scene)
     // which is largest where neighbours alternate and q vanishes.
     const double dx = scene.space.spacing, h = scene.smoothing_length();
     const double nu = 0.45 * (scene.effects.viscosity ? scene.effects.viscosity->alpha : 0);
-    const double diffusion = strength_of_diffusion(scene);
+    // The hourglass control acts as a diffusion of the velocities.
+    const double diffusion = strength_of_diffusion(scene) + 2 * scene.accuracy.hourglass;
     double limit = std::numeric_limits<double>::infinity();
     for (const Vector way : {Vector{1, 0, 0}, Vector{1, 0, 1}, Vector{1, 1, 1}}) {
         if (scene.dimensions == 2 && way.y != 0) continue;

@@ -38,7 +38,7 @@ rate_friction = { friction_angle = 33.0, grain = 0.001 }
 pore_pressure = { table = [[0.0, 0.3], [1.0, 0.1]] }
 damping = { ratio = 0.02, until = 0.005 }
 """,
-    "accuracy": 'correction = "adjoint"\ncfl = 0.8\nshifting = 2.0\n',
+    "accuracy": 'correction = "adjoint"\ncfl = 0.7\nshifting = 2.0\nhourglass = 0.1\n',
 }
 
 

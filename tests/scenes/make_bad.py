@@ -567,6 +567,15 @@ CASES = {
         acc('scheme = "leap-frog"\nshifting = 2.0'),
         r'accuracy\.shifting: expected 0, found 2: the leap-frog scheme shifts no particles\. Remedy: accuracy\.scheme = "staggered"',
     ),
+    "hourglass_in_one_pass": (
+        acc('scheme = "leap-frog"\nhourglass = 0.1'),
+        r'accuracy\.hourglass: expected 0, found 0\.1: the leap-frog scheme has no hourglass control\. Remedy: accuracy\.scheme = "staggered"',
+    ),
+    "hourglass_too_strong": (acc("hourglass = 0.5"), r"accuracy\.cfl: expected a number below the stable limit"),
+    "kernel_norm_misspelt": (
+        acc('kernel_norm = "grid"'),
+        r':22: accuracy\.kernel_norm: expected one of "lattice", "continuum", found "grid"',
+    ),
     "shifting_beyond_range": (acc("shifting = 7.0"), r":22: accuracy\.shifting: expected a number, 0 <= x <= 3, found 7"),
     "correction_is_true": (
         acc("correction = true"),

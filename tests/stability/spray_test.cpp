@@ -34,7 +34,8 @@ struct Burst {
 Burst burst(bool floor, const std::string& scheme)
 {
     SceneText t;
-    t.spacing = 0.02, t.end = 0.06, t.strength = "friction_angle = 30.0", t.accuracy += "\nscheme = \"" + scheme + "\"\ncfl = 0.2";
+    t.spacing = 0.02, t.end = 0.06, t.strength = "friction_angle = 30.0",
+    t.accuracy += "\nkernel_norm = \"continuum\"\nscheme = \"" + scheme + "\"\ncfl = 0.2";
     t.bodies = box("body", {0, 0, 0}, {0.2, 0, 0.2});
     std::vector<Vector> points;
     if (floor) {

@@ -126,6 +126,7 @@ inline Cloud cloud(Arrangement kind, Scene s)
 template <class Planted> void plant_faults(Planted planted)
 {
     planted("kernel", [](Scene& m) { m.accuracy.kernel = scene::Kernel::WendlandC4; });
+    planted("the kernel's norm", [](Scene& m) { m.accuracy.kernel_norm = scene::KernelNorm::Continuum; });
     planted("alpha", [](Scene& m) { m.effects.viscosity->alpha *= 1.05; });
     planted("beta", [](Scene& m) { m.effects.viscosity->beta *= -1; });
     planted("artificial stress", [](Scene& m) { m.effects.artificial_stress->epsilon *= -1; });

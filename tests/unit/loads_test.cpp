@@ -50,6 +50,7 @@ TEST(Loads, UnitPressureIsThatOfTheLattice)
     const auto of = [](int dimensions, double h, scene::Kernel kernel) {
         Scene s;
         s.dimensions = dimensions, s.space.h = h, s.accuracy.kernel = kernel;
+        s.accuracy.kernel_norm = scene::KernelNorm::Continuum;
         return 1 / unit_pressure(s);
     };
     EXPECT_NEAR(of(2, 1.3, scene::Kernel::WendlandC2), 0.973921482143377, 1e-12);

@@ -82,6 +82,7 @@ public:
             if (start_.has(field::opened_volume))
                 cloud_.particles[field::opened_volume].set(i, std::as_const(start_)[field::opened_volume][i] > 0 ? 1e-300 : 0.0);
         }
+        model_->make_records(cloud_.particles, cloud_.soils, {}); // who is in tension
     }
     /// Every cluster alone.
     std::vector<Worked> run(int stage, double dt, double next, double energy_unit)
@@ -140,9 +141,11 @@ template <class State> StrainStageResult run_strain(const bench::Cloud& sorted, 
     };
     const auto unstressed = run({});
     for (Index i = 0; i < n; ++i) loaded[i] = unstressed[i];
-    const auto forth = run(S);
+    // under a pressure, which no rotation turns: soil in tension is strained less
+    const Stress pressed{-1.5e8, -1.5e8, -1.5e8, 0, 0, 0};
+    const auto forth = run(pressed + S);
     for (Index i = 0; i < n; ++i) turned[i] = forth[i];
-    const auto back = run(-1.0 * S);
+    const auto back = run(pressed - S);
     for (Index i = 0; i < n; ++i) {
         const Vector w = detail::half_spin_between(S, 0.5 * (turned[i] - back[i])); // of W dt/2
         const Vector W = (2 / dt) * w;

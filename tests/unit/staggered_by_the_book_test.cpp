@@ -197,9 +197,13 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
     Read read;
     std::vector<book::Strain> at_start;
     std::vector<book::Matrix> K;
+    std::vector<book::Affine> affine;
     for (std::size_t i = 0; i < x.size(); ++i) {
         at_start.push_back(book::strain_of(i, ground_soil, kept, points, setting, 0));
         if (s.accuracy.correction == scene::Correction::Adjoint) K.push_back(at_start.back().K);
+        const auto held =
+            book::strained(book::particle(ground_soil, i, setting), c.soils[std::size_t(soil[i])], kept[i], at_start.back(), setting, 0);
+        affine.push_back({at_start.back().L, held.weight});
     }
     for (std::size_t i = 0; i < x.size(); ++i) {
         const auto particle = book::particle(ground_soil, i, setting);
@@ -207,7 +211,7 @@ Read by_the_book(const Cloud& c, const Scene* other = nullptr, const Planted& pl
         read.strained.push_back(book::strained(particle, c.soils[std::size_t(soil[i])], kept[i], read.strain.back(), setting, dt));
         book::Kept forced = kept[i];
         forced.acceleration = at_start[i].viscous, forced.friction = at_start[i].friction;
-        read.forced.push_back(book::force_on(i, ground_soil, forced, K, points, setting, dt, next));
+        read.forced.push_back(book::force_on(i, ground_soil, forced, K, affine, points, setting, dt, next));
         ++read.contacts[int(read.forced.back().contact)], ++read.rubs[int(read.forced.back().rubs)];
     }
     return read;
@@ -572,6 +576,34 @@ TEST(StaggeredByTheBook, AdjointCorrection)
             EXPECT_GT(off.acceleration, 10 * rough) << "the pair forces' correction is not noticed";
         }
     }
+}
+
+TEST(StaggeredByTheBook, HourglassControl)
+{
+    int holding = 0, yielding = 0;
+    for (const Scene& bare : scenes(staggered)) {
+        if (bare.accuracy.correction == scene::Correction::None) continue;
+        for (const auto correction : {scene::Correction::None, scene::Correction::Gradient, scene::Correction::Adjoint}) {
+            Scene s = bare;
+            s.accuracy.hourglass = 0.2, s.accuracy.correction = correction;
+            s.soils[0].cohesion = 2e3;
+            for (const auto arranged : {Jitter, Disorder, Hard, Soils}) {
+                expect_by_the_book(cloud(arranged, s), by_the_book(cloud(arranged, s)), "hourglass control");
+                Scene walled = s;
+                walled.walls = corner(s.dimensions);
+                const Cloud c = cloud(arranged, walled);
+                const Read read = by_the_book(c);
+                expect_by_the_book(c, read, "hourglass control in a corner");
+                for (const auto& i : read.strained) ++(i.weight > 0 ? holding : yielding);
+                Scene mistaken = walled;
+                mistaken.accuracy.hourglass *= 1.02;
+                const auto off = difference(c, passed(c, Arithmetic::Simd, read), by_the_book(c, &mistaken));
+                EXPECT_GT(off.acceleration, 10 * rough) << "its strength is not noticed";
+            }
+        }
+    }
+    EXPECT_GT(holding, 500);
+    EXPECT_GT(yielding, 500);
 }
 
 TEST(StaggeredByTheBook, SoilWhoseConeChanges)

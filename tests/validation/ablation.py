@@ -52,6 +52,8 @@ GRADIENT = {"accuracy.correction": "gradient"}
 MIXED = {"accuracy.precision": "mixed"}
 STRESS = {"effects.artificial_stress": {"epsilon": 0.5, "exponent": 2.55}}
 NO_STRESS = {"effects.artificial_stress": None}
+HOURGLASS = {"accuracy.hourglass": 0.1}
+CREEPS = {"accuracy.kernel": "cubic spline", "space.h": 1.3}
 EFFECTS = {
     "viscosity": {s: ({"effects.viscosity": None}, NONE) for s in SCENES},
     "artificial stress": {"column": (NONE, STRESS), "block": (NO_STRESS, NONE), "slope": (NO_STRESS, NONE)},
@@ -64,6 +66,12 @@ EFFECTS = {
     "gradient correction": {s: (NONE, GRADIENT) for s in SCENES},
     "adjoint correction": {s: (NONE, {"accuracy.correction": "adjoint", "accuracy.cfl": 0.8}) for s in SCENES},
     "shifting, constant 2": {s: (NONE, {"accuracy.shifting": 2.0}) for s in SCENES},
+    "hourglass control, 0.1": {
+        "column": (NONE, HOURGLASS),
+        "block": (NONE, HOURGLASS),
+        "slope": (CREEPS, dict(CREEPS, **HOURGLASS)),  # with the cubic spline and h 1.3, where it is for
+    },
+    "kernel norm, lattice": {s: ({"accuracy.kernel_norm": "continuum"}, NONE) for s in SCENES},
     "softening": {"block": (NONE, {"soil.softening": {"cohesion": 2500.0, "friction_angle": 20.0, "slip": 0.1}})},
     "mu(I) friction": {"column": (NONE, {"soil.rate_friction": {"friction_angle": 30.0, "grain": 0.0015, "grain_density": 2700.0}})},
     "pore pressure": {"slope": (NONE, {"effects.pore_pressure": {"table": [[0.0, 4.0]]}})},

@@ -6,8 +6,8 @@ namespace kuzure::validation {
 
 /// Why the period is too long. Rows near the surface see few neighbours: their strain and force are both M = 0.77 of what they
 /// should be, which takes 31, 20 and 15 % of the bending stiffness at H/dx = 6, 10 and 14 and makes T 20, 12 and 8 % longer.
-inline const std::string soft_surface =
-    "surface rows lack stiffness (T +20, +12, +8 % at H/dx = 6, 10, 14), accuracy.correction mends half; amplitude 0.6 L";
+inline const std::string soft_surface = "surface rows lack stiffness (T +20, +12, +8 % at H/dx = 6, 10, 14): accuracy.correction mends it, "
+                                        "whose rows stand below; amplitude 0.6 L";
 
 /// With Wendland C2 and forces adjoint to the corrected gradient.
 inline const std::string adjoint = "correction = \"adjoint\"\ncfl = 0.8";

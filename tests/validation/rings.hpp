@@ -4,6 +4,11 @@
 
 namespace kuzure::validation {
 
+/// What artificial_stress = "auto" has. Gray's 0.3 was fitted to the published form, which takes a fifth of the stiffness from what is
+/// stretched; the conservative form leaves it all, and rings so stiff clump where 0.3 is all that keeps their particles apart.
+inline constexpr double own_epsilon = 0.5;
+inline const std::string old_epsilon = "fitted to a form of the artificial stress that softens what is stretched";
+
 struct Rebound {
     double speed = 0;          // m/s at which the rings part, over that at which they met
     double least_distance = 0; // spacings, over the run

@@ -256,6 +256,7 @@ def main(quick=False, slow=False):
         ("cubic spline, h 1.2", {"space.h": 1.2, "accuracy.kernel": "cubic spline"}),
         ("cubic spline, h 1.3", {"space.h": 1.3, "accuracy.kernel": "cubic spline"}),
         ("cubic spline, h 1.5", {"accuracy.kernel": "cubic spline"}),
+        ("cubic spline, h 1.3, hourglass 0.1", {"space.h": 1.3, "accuracy.kernel": "cubic spline", "accuracy.hourglass": 0.1}),
     ):
         m = at(1.0, psi0, 20, "-rest-" + label.split("(")[0].strip().replace(", ", "-").replace(" ", "-"), **changes)
         case.record(
