@@ -134,7 +134,7 @@ def main():
     check(p.tags.count("circle") >= 2, "the roofline has a dot a phase")
     progress = open(work + "/done/progress.csv").read().splitlines()
     check(progress[0] == "time,step,dt,wall,steps_per_second,balance" and len(progress) > 50, "progress.csv has its rows")
-    run("run", "s.toml", "-o", "failed", "--quiet", "--force-step", "--set", "time.step=7.2e-3", "--set", "time.end=7.2", expect=3)
+    run("run", "s.toml", "-o", "failed", "--quiet", "--force-step", "--set", "time.step=3.2e-3", "--set", "time.end=7.2", expect=3)
     p, text = page("failed", "the numbers broke (exit code 3)", "failed")
     check(
         "the moment of failure" in p.text and "the last picture before it" in p.text and text.count("data:image/png") == 3,
