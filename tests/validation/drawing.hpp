@@ -267,6 +267,7 @@ struct Drawing {
     double skin = 0.2;
     double low = 0; // m, where the period's faces lie along x
     std::string what = "the fewest pieces";
+    double cfl = 1;
 };
 struct Generated {
     unsigned seed;
@@ -369,7 +370,7 @@ inline Scene scene_of(const Generated& g, const Drawing& d, std::size_t particle
     const double far = 100, e = spacing;
     if (g.periodic) t.space = fmt::format("low = [{}, -50, -50]\nhigh = [{}, 50, 250]\nperiodic = [\"x\"]", d.low, d.low + g.width);
     t.bodies = box("body", {d.low, 0, far}, {d.low + e, e, far + double(particles) * e});
-    t.accuracy = fmt::format("skin = {}", d.skin);
+    t.accuracy = fmt::format("skin = {}\ncfl = {}", d.skin, d.cfl);
     Scene s = t.scene();
     s.walls = d.walls;
     for (const auto& issue : scene::check(s))
