@@ -2,6 +2,7 @@
 // Artificial stress between particles of which one is in tension.
 #include "solver/pairs/batch.hpp"
 #include "solver/pairs/record.hpp"
+#include "solver/physics/smoothing.hpp"
 #include "solver/scene/parts.hpp"
 #include <algorithm>
 #include <cmath>
@@ -17,12 +18,15 @@ public:
         double node[degree + 1], inverse[degree + 1][degree + 1];
         for (int k = 0; k <= degree; ++k) node[k] = -0.5 * std::cos(std::numbers::pi * k / degree);
         interpolation(node, inverse);
-        for (int i = 0; i < intervals; ++i)
+        for (int i = 0; i < intervals; ++i) {
+            double value[degree + 1];
+            for (int j = 0; j <= degree; ++j) value[j] = f((i + 0.5 + node[j]) / per_interval_);
             for (int k = 0; k <= degree; ++k) {
                 double c = 0;
-                for (int j = 0; j <= degree; ++j) c += inverse[k][j] * f((i + 0.5 + node[j]) / per_interval_);
+                for (int j = 0; j <= degree; ++j) c += inverse[k][j] * value[j];
                 of_[k][i] = c;
             }
+        }
     }
     KUZURE_INLINE double at(double t) const
     {
@@ -67,16 +71,13 @@ struct ArtificialStress {
         const double at_spacing = kernel.value(2 * kernel.h - spacing);
         const auto power = [&](double t) { return std::pow(kernel.value(t) / at_spacing, a.exponent); };
         ArtificialStress of{a.epsilon, 0, 0, PowerOfKernel(2 * kernel.h, power)};
-        const int reach = int(2 * kernel.h / spacing) + 1, across = dimensions == 3 ? reach : 0;
         double near = 0, all = 0;
-        for (int x = -reach; x <= reach; ++x)
-            for (int y = -reach; y <= reach; ++y)
-                for (int z = -across; z <= across; ++z) {
-                    const double r = spacing * std::sqrt(double(x * x + y * y + z * z)), t = std::max(2 * kernel.h - r, 0.0);
-                    if (r <= 0 || t <= 0) continue;
-                    const double weight = kernel.F(t, r, 1 / r) * x * x;
-                    near += weight * power(t), all += weight;
-                }
+        for_each_on_lattice(int(2 * kernel.h / spacing) + 1, dimensions, [&](int x, double spacings) {
+            const double r = spacing * spacings, t = std::max(2 * kernel.h - r, 0.0);
+            if (t <= 0) return;
+            const double weight = kernel.F(t, r, 1 / r) * x * x;
+            near += weight * power(t), all += weight;
+        });
         of.mean = near / all, of.adjoint_epsilon = of.epsilon / (1 - of.epsilon * of.mean);
         return of;
     }

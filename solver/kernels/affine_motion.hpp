@@ -66,12 +66,15 @@ protected:
     /// epsilon N [sum_j V_j f (v_j - v_i) (x) grad W] N: what the strain of soil in tension is less by.
     template <class Sums> KUZURE_INLINE Sym3<U> less_in_tension(const Sums& sums, const Sym3<U>& sigma, const Lanes& lanes) const
     {
+        const auto tensile = [&](int k) { return tension_[lanes.particle(k)].any != 0; };
+        bool any = false;
+        for (int k = 0; k < lanes.n; ++k) any = any || tensile(k);
+        if (!any) return {};
         const Sym3<U> near = U(model_.artificial_stress.adjoint_epsilon * scale_) * symmetric_part(sums.near_grad_v);
         const auto at = [](const Sym3<U>& s, int k) {
             return Stress{lane(s.xx, k), lane(s.yy, k), lane(s.zz, k), lane(s.xy, k), lane(s.yz, k), lane(s.xz, k)};
         };
-        return lane_by_lane<Sym3, U>(
-            [&](int k) { return tension_[lanes.particle(k)].any == 0 ? Stress{} : tensile_part(at(sigma, k), at(near, k)); });
+        return lane_by_lane<Sym3, U>([&](int k) { return tensile(k) ? tensile_part(at(sigma, k), at(near, k)) : Stress{}; });
     }
 };
 

@@ -160,16 +160,21 @@ struct Setting {
         Kernel k{how.kernel, how.dimensions, how.h};
         if (how.norm == scene::KernelNorm::Continuum) return k;
         // On the lattice the gradient of x is 1: sum_j V (x_j - x_i) (x) grad W = 1
-        double moment = 0;
+        k.norm = 1 / on_lattice(k, [](double) { return 1.0; });
+        return k;
+    }
+    /// -sum_j V weight(r) x_ij dW/dx over the lattice.
+    template <class Weight> double on_lattice(const Kernel& k, Weight weight) const
+    {
+        double sum = 0;
         const int reach = int(2 * how.h / how.spacing) + 1, across = how.dimensions == 3 ? reach : 0;
         for (int x = -reach; x <= reach; ++x)
             for (int y = -across; y <= across; ++y)
                 for (int z = -reach; z <= reach; ++z) {
                     const Vector x_ij = how.spacing * Vector{double(x), double(y), double(z)};
-                    moment -= volume() * x_ij.x * k.gradient(x_ij).x;
+                    sum -= volume() * weight(length(x_ij)) * x_ij.x * k.gradient(x_ij).x;
                 }
-        k.norm = 1 / moment;
-        return k;
+        return sum;
     }
     double volume() const { return std::pow(how.spacing, how.dimensions); } // of a particle at reference density
 };

@@ -1,8 +1,8 @@
 #pragma once
 // The force stage of the staggered scheme: forces of stresses, artificial stress and walls, with the viscous force of the strain stage
 // the acceleration of t^(n+1), and with it the velocity.
+#include "solver/kernels/contact_forces.hpp"
 #include "solver/kernels/loads_on_faces.hpp"
-#include "solver/kernels/wall_contact.hpp"
 
 namespace kuzure {
 
@@ -109,10 +109,9 @@ private:
                     e.grad = w * r;
                     if constexpr (M::tensile) e.t = t;
                     if constexpr (M::corrected) e.r = r;
-                    if constexpr (M::corrected && !M::diffusive)
-                        if (controls) e.q = w * (r2 / (r2 + softening));
+                    if constexpr (M::corrected || M::diffusive)
+                        if (M::diffusive || controls) e.q = w * (r2 / (r2 + softening));
                     if constexpr (M::diffusive) {
-                        e.q = w * (r2 / (r2 + softening));
                         const Vector g = model_.stress_diffusion.gravity;
                         e.along = dot(Vec3<V>{V(T(g.x)), V(T(g.y)), V(T(g.z))}, r);
                     }

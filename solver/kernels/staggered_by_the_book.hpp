@@ -326,16 +326,8 @@ struct NearTension {
         if (!s.how.effects.artificial_stress) return t;
         t.exponent = s.how.effects.artificial_stress->exponent;
         const Kernel kernel = s.kernel();
-        const int reach = int(2 * s.how.h / s.how.spacing) + 1, across = s.how.dimensions == 3 ? reach : 0;
-        double near = 0, all = 0;
-        for (int x = -reach; x <= reach; ++x)
-            for (int y = -across; y <= across; ++y)
-                for (int z = -reach; z <= reach; ++z) {
-                    const Vector r = s.how.spacing * Vector{double(x), double(y), double(z)};
-                    const double weight = r.x * kernel.gradient(r).x;
-                    near += weight * t.f(kernel, s.how.spacing, length(r)), all += weight;
-                }
-        t.mean = near / all;
+        t.mean = s.on_lattice(kernel, [&](double r) { return t.f(kernel, s.how.spacing, r); }) /
+                 s.on_lattice(kernel, [](double) { return 1.0; });
         t.epsilon = s.how.effects.artificial_stress->epsilon / (1 - s.how.effects.artificial_stress->epsilon * t.mean);
         return t;
     }

@@ -80,18 +80,22 @@ struct WendlandC4 {
     }
 };
 
+/// Calls visit(x, r) for the points of a cubic (square) lattice of spacing 1 around one of its points, out to `reach` along each axis.
+template <class Visit> void for_each_on_lattice(int reach, int dimensions, Visit visit)
+{
+    const int across = dimensions == 3 ? reach : 0;
+    for (int x = -reach; x <= reach; ++x)
+        for (int y = -reach; y <= reach; ++y)
+            for (int z = -across; z <= across; ++z)
+                if (const int r2 = x * x + y * y + z * z; r2 > 0) visit(x, std::sqrt(double(r2)));
+}
 /// -sum_j V_j x_ij dW/dx over a cubic (square) lattice of spacing 1 around one of its points, for a kernel of h in spacings: what its
 /// gradients make of a linear field, 1 of infinitely many neighbours.
 template <class Kernel> double lattice_moment(const Kernel& kernel, int dimensions)
 {
-    const int reach = int(2 * kernel.h) + 1, across = dimensions == 3 ? reach : 0;
     double sum = 0;
-    for (int x = -reach; x <= reach; ++x)
-        for (int y = -reach; y <= reach; ++y)
-            for (int z = -across; z <= across; ++z) {
-                const double r = std::sqrt(double(x * x + y * y + z * z));
-                if (r > 0) sum -= kernel.scale * kernel.F(std::max(2 * kernel.h - r, 0.0), r, 1 / r) * x * x;
-            }
+    for_each_on_lattice(int(2 * kernel.h) + 1, dimensions,
+                        [&](int x, double r) { sum -= kernel.scale * kernel.F(std::max(2 * kernel.h - r, 0.0), r, 1 / r) * x * x; });
     return sum;
 }
 /// What gradients are multiplied by: 1/lattice_moment, by which those of linear fields are exact on the lattice (in soil that has flowed

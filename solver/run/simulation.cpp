@@ -289,7 +289,7 @@ Vector Simulation::frame(double time) const
 
 StepInput Simulation::step_input(double dt, double next)
 {
-    // Shifted is the move of steps 4, 8, ... and decided by the step before; once more where forces are made anew in between.
+    // Shifted is the move of steps 8, 16, ... and decided by the step before; once more where forces are made anew in between.
     const bool shifts = scene_.accuracy.shifting > 0, shifted = shifts && clock_.step > 0 && clock_.step % Shifting::every == 0;
     StepInput in{.particles = &particles_,
                  .lists = &layout_.lists(),

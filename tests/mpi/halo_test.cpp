@@ -95,6 +95,15 @@ std::vector<BlockWork> blocks_of(const Domain& d, const Particles& p)
     return b;
 }
 
+/// Cut by where these particles are, each of which is with its owner then.
+Domain cut_domain(const Cloud& c, Particles& p)
+{
+    Domain domain = domain_of(c);
+    domain.cut(blocks_of(domain, p));
+    domain.migrate(p);
+    return domain;
+}
+
 void expect_nobody_lost(const Particles& p, int n)
 {
     const auto all = all_particles(p);
@@ -258,9 +267,7 @@ TEST(Halo, AllTellAllSeldom)
     for (const Cloud& c : clouds) {
         SCOPED_TRACE(c.name);
         Particles p = scatter(c, 21);
-        Domain domain = domain_of(c);
-        domain.cut(blocks_of(domain, p));
-        domain.migrate(p);
+        Domain domain = cut_domain(c, p);
         constexpr int plans = 24;
         const double each = 0.1 * c.reach; // half a skin
         for (int k = 0; k < plans; ++k) {
@@ -289,9 +296,7 @@ TEST(Halo, ALeapIsToldToAll)
 {
     const Cloud& c = clouds[0];
     Particles p = scatter(c, 22);
-    Domain domain = domain_of(c);
-    domain.cut(blocks_of(domain, p));
-    domain.migrate(p);
+    Domain domain = cut_domain(c, p);
     static_cast<void>(domain.plan_halo(p, c.reach));
     const auto before = domain.tellings();
     const auto all = all_particles(p);
@@ -333,9 +338,7 @@ TEST(Halo, NothingAtAll)
 TEST(Halo, RefusesMisuse)
 {
     Particles p = scatter(clouds[2], 5);
-    Domain domain = domain_of(clouds[2]);
-    domain.cut(blocks_of(domain, p));
-    domain.migrate(p);
+    Domain domain = cut_domain(clouds[2], p);
     EXPECT_THROW(domain.plan_halo(p, 1.5), Broken); // further than the period of 1 m
     Halo halo(world(), domain.plan_halo(p, 0.1), 8);
     const auto copy = [](Index, Vector, std::byte* to) { std::memset(to, 0, 8); };
@@ -356,9 +359,7 @@ TEST(Halo, IsRenewed)
 {
     const Cloud& c = clouds[0];
     Particles p = scatter(c, 8);
-    Domain domain = domain_of(c);
-    domain.cut(blocks_of(domain, p));
-    domain.migrate(p);
+    Domain domain = cut_domain(c, p);
     std::unique_ptr<Halo> halo;
     for (int k = 0; k < 20; ++k) {
         halo = std::make_unique<Halo>(world(), domain.plan_halo(p, c.reach), 128);

@@ -1,5 +1,6 @@
 // Soil that has opened and flies: its opened volume is a state of the place, not of the way there, and has a bound; so a rough slope sheds
 // soil for as long as it likes, and soil that was thrown and lands keeps its volume.
+#include "solver/physics/smoothing.hpp"
 #include "tests/stability/hard.hpp"
 #include <map>
 #include <random>
@@ -9,19 +10,14 @@ using namespace kuzure::validation;
 
 namespace {
 
-/// The cubic spline in 2-D, 1/m^2.
-double spline(double r, double h)
-{
-    const double q = r / h, t = 2 - q, scale = 10 / (7 * pi * h * h);
-    return q >= 2 ? 0 : q < 1 ? scale * (1 - 1.5 * q * q + 0.75 * q * q * q) : scale * 0.25 * t * t * t;
-}
 /// What fills a particle's support: its neighbours' volumes, and twice the wall's, V sum_j W + 2 V sum_w W.
 double filled(const Simulation& sim, Index i, std::span<const Vector> wall)
 {
-    const double h = sim.scene().smoothing_length();
+    const CubicSpline kernel(sim.scene().smoothing_length(), 2);
+    const auto W = [&](Vector there) { return kernel.value(std::max(2 * kernel.h - length(position(sim, i) - there), 0.0)); };
     double sum = 0;
-    each(sim, [&](Index j) { sum += spline(length(position(sim, i) - position(sim, j)), h); });
-    for (const Vector& w : wall) sum += 2 * spline(length(position(sim, i) - w), h);
+    each(sim, [&](Index j) { sum += W(position(sim, j)); });
+    for (const Vector& w : wall) sum += 2 * W(w);
     return sim.scene().particle_volume() * sum;
 }
 double opened(const Simulation& sim, Index i) { return sim.particles()[field::opened_volume][i]; }
