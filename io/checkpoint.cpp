@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 constexpr const char* format_name = "kuzure checkpoint";
 // Of a result directory; the unnamed one is newer than the previous where a crash fell between the two renames.
 constexpr const char *newest_name = "checkpoint.h5", *unnamed_name = "checkpoint.h5.tmp", *previous_name = "checkpoint.prev.h5";
