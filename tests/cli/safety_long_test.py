@@ -87,7 +87,7 @@ def main():
             room = 0.01 if across == 10 else 0.0  # the coarse ones may miss the gate by so much: they show how the factor goes with dx
             check(
                 (1 - room) * least <= factor <= (1 + room) * most,
-                f"{name}, H/{across}: {factor:.4g} ({answer['low']} to {answer['high']}), gate {least:.3f} to {most:.3f}; "
+                f"{name}, H/{across}: {factor:.4g} ({answer['stands']} to {answer['fails']}), gate {least:.3f} to {most:.3f}; "
                 f"{len(answer['trials'])} trials, {seconds:.0f} s",
             )
     finish()
